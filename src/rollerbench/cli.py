@@ -1,0 +1,187 @@
+"""The command line: thin commands over the Python API."""
+
+import logging
+import sys
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rollerbench.errors import RollerbenchError, RollerbenchWarning, SimulationError
+
+app = typer.Typer(
+    name="rollerbench",
+    help="A Drake workbench for wheeled, omnidirectional and wheel-legged mobile robots.",
+    epilog="Example: rollerbench run youbot_plus_y",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
+
+BAD_INPUT, FAILED = 2, 3
+
+
+def main() -> None:
+    """Entry point of the command rollerbench."""
+    with _clear_messages():
+        app()
+
+
+@app.command(epilog="Example: rollerbench robots youbot_base")
+def robots(
+    robot: Annotated[str | None, typer.Argument(help="Name of a shipped robot, or path to a robot.yaml.")] = None,
+) -> None:
+    """List the robots; with one, print its matrices, mobility, isotropy and limits."""
+    from rollerbench.description import load_robot
+    from rollerbench.report.robots import robot_details, robot_list
+    from rollerbench.resources import robot_names
+
+    if robot is None:
+        _print(robot_list([load_robot(name) for name in robot_names()]))
+    else:
+        for table in robot_details(load_robot(robot)):
+            _print(table)
+
+
+@app.command(epilog="Example: rollerbench scenarios")
+def scenarios() -> None:
+    """List the shipped scenarios."""
+    from rollerbench.report.robots import scenario_list
+    from rollerbench.resources import scenario_files
+
+    _print(scenario_list(scenario_files()))
+
+
+@app.command(epilog="Example: rollerbench run youbot_plus_y -o runs/left --set ground.friction=0.5")
+def run(
+    scenario: Annotated[str, typer.Argument(help="Name of a shipped scenario, or path to a scenario.yaml.")],
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Run folder to write.", show_default="runs/NAME")
+    ] = None,
+    robot: Annotated[
+        str | None, typer.Option(help="Another robot: a name, or a path to a robot.yaml.")
+    ] = None,
+    set_: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="Override a field, such as plant.time_step=0.002."),
+    ] = None,
+    live: Annotated[bool, typer.Option("--live", help="Show the run in a browser, in real time.")] = False,
+    no_recording: Annotated[
+        bool, typer.Option("--no-recording", help="Write no recording.html, which is faster.")
+    ] = False,
+) -> None:
+    """Simulate a scenario, compare it with the equations, and write the run folder."""
+    from rollerbench import simulation
+    from rollerbench.report.terminal import summary_table
+
+    overrides = list(set_ or [])
+    overrides += ["recording.html=false"] if no_recording else []
+    overrides += ["simulator.target_realtime_rate=1.0"] if live else []
+    logging.getLogger("drake").setLevel(logging.WARNING)
+    loaded = simulation.load_scenario(scenario, overrides=overrides, robot=robot)
+    meshcat = None
+    if live:
+        from rollerbench.visualization.scene import local_meshcat
+
+        meshcat = local_meshcat()
+        print(f"Live at {meshcat.web_url()}", file=sys.stderr)
+    try:
+        with _progress(loaded.name, loaded.duration) as progress:
+            result = simulation.run(loaded, output=output, progress=progress, meshcat=meshcat)
+    except SimulationError as error:
+        if error.result is not None:
+            _print(summary_table(error.result.summary))
+            _print(f"Kept until then: {error.result.folder}")
+        raise
+    _print(summary_table(result.summary))
+    _print(f"Written: {result.folder}")
+    if live and sys.stdin.isatty():
+        input("Press Enter to close the live page. ")
+
+
+@app.command(epilog="Example: rollerbench build youbot_base")
+def build(
+    robots: Annotated[
+        list[str] | None,
+        typer.Argument(help="Names or robot.yaml files; by default all shipped robots.", show_default=False),
+    ] = None,
+) -> None:
+    """Write the SDF model of robots beside their robot.yaml."""
+    from rollerbench.description import load_robot
+    from rollerbench.description.files import write_atomically
+    from rollerbench.resources import robot_file, robot_names
+    from rollerbench.sdf import robot_to_sdf
+
+    for name in robots or robot_names():
+        file = robot_file(name)
+        robot = load_robot(file)
+        target = file.parent / f"{robot.name}.sdf"
+        try:
+            write_atomically(target, robot_to_sdf(robot))
+        except OSError as error:
+            raise RollerbenchError(f"{target}: cannot be written: {error}") from error
+        _print(f"{target}")
+
+
+@app.command(epilog="Example: rollerbench schema > robot.schema.json")
+def schema(
+    scenario: Annotated[
+        bool, typer.Option("--scenario", help="The schema of scenario.yaml instead of robot.yaml.")
+    ] = False,
+) -> None:
+    """Print the JSON Schema of robot.yaml, for editors."""
+    import json
+
+    from rollerbench.description import Robot
+
+    model: type = Robot
+    if scenario:
+        from rollerbench.simulation import Scenario
+
+        model = Scenario
+    print(json.dumps(model.model_json_schema(), indent=2))
+
+
+@contextmanager
+def _clear_messages() -> Iterator[None]:
+    """Bad input ends with one message and exit status 2, a failed simulation with 3; warnings are one line each."""
+
+    def show(message: Warning | str, category: type[Warning], *_: object, **__: object) -> None:
+        print(f"warning: {message}", file=sys.stderr)
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", RollerbenchWarning)
+        warnings.showwarning = show
+        try:
+            yield
+        except SimulationError as error:
+            print(f"failed: {error}", file=sys.stderr)
+            raise SystemExit(FAILED) from None
+        except RollerbenchError as error:
+            print(f"error: {error}", file=sys.stderr)
+            raise SystemExit(BAD_INPUT) from None
+
+
+@contextmanager
+def _progress(label: str, total: float) -> Iterator[Callable[[float], None]]:
+    """A progress bar on the terminal's standard error; nothing elsewhere."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed:.2f}/{task.total:g} s"))
+    console = Console(stderr=True)
+    with Progress(*columns, TimeRemainingColumn(), console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task(label, total=total)
+        yield lambda now: bar.update(task, completed=now)
+
+
+def _print(what: object) -> None:
+    from rich.console import Console
+
+    # Piped output is not cut to a terminal's width.
+    console = Console(highlight=False, soft_wrap=True) if sys.stdout.isatty() else Console(highlight=False, width=140)
+    console.print(what, markup=False) if isinstance(what, str) else console.print(what)

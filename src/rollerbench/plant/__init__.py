@@ -1,0 +1,7 @@
+"""Robots as parts of a Drake MultibodyPlant."""
+
+from rollerbench.plant.ground import add_ground
+from rollerbench.plant.robot_model import RobotModel, add_robot
+from rollerbench.plant.servo import ServoGains, servo_gains
+
+__all__ = ["RobotModel", "ServoGains", "add_ground", "add_robot", "servo_gains"]

@@ -1,0 +1,174 @@
+"""A robot as part of a MultibodyPlant."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydrake.math import RigidTransform, RollPitchYaw
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import (
+    JointActuator,
+    JointIndex,
+    ModelInstanceIndex,
+    PdControllerGains,
+    RevoluteJoint,
+    RigidBody,
+)
+from pydrake.systems.framework import Context
+
+from rollerbench.description import AnyWheel, Robot, load_robot
+from rollerbench.plant.servo import ServoGains, servo_gains
+from rollerbench.sdf import names, robot_to_sdf
+from rollerbench.sdf.contact import static_penetration
+
+
+@dataclass(frozen=True, kw_only=True)
+class RobotModel:
+    """Where a robot's parts are in a plant.
+
+    The servo takes desired states [q; v] of `actuated_joints` on
+    plant.get_desired_state_input_port(model_instance).
+
+    Attributes:
+        robot: What was added.
+        plant: Where it was added.
+        model_instance: Its model instance.
+        body: The chassis.
+    """
+
+    robot: Robot
+    plant: MultibodyPlant
+    model_instance: ModelInstanceIndex
+    body: RigidBody
+
+    def drive_joint(self, wheel: AnyWheel) -> RevoluteJoint:
+        """The joint about a wheel's axle."""
+        return self._joint(names.drive_joint(wheel.name))
+
+    def swivel_joint(self, wheel: AnyWheel) -> RevoluteJoint:
+        """The joint about the vertical axis of a castor or steered wheel."""
+        return self._joint(names.swivel_joint(wheel.name))
+
+    def roller_joints(self, wheel: AnyWheel) -> list[RevoluteJoint]:
+        """The joints of a wheel's rollers, from the one at the bottom at wheel angle 0; none for a tyre."""
+        count = wheel.ring.count if wheel.ring else 0
+        return [self._joint(names.roller_joint(wheel.name, index)) for index in range(count)]
+
+    @property
+    def actuators(self) -> list[JointActuator]:
+        """Actuators in the order of the plant's actuation and desired state ports."""
+        return [
+            self.plant.get_joint_actuator(index)
+            for index in self.plant.GetJointActuatorIndices(self.model_instance)
+        ]
+
+    def desired_state_matrix(self) -> NDArray[np.float64]:
+        """Matrix (2 n_actuators, n_driven + n_steered) from [wheel_speeds; steering_angles] to the servo's [q; v].
+
+        Drive servos have no stiffness, so their desired angles stay 0; steering servos hold angles.
+        """
+        robot, actuators = self.robot, self.actuators
+        row = {actuator.joint().name(): index for index, actuator in enumerate(actuators)}
+        matrix = np.zeros((2 * len(actuators), len(robot.driven_wheels) + len(robot.steered_wheels)))
+        for column, wheel in enumerate(robot.driven_wheels):
+            matrix[len(actuators) + row[names.drive_joint(wheel.name)], column] = 1.0
+        for column, wheel in enumerate(robot.steered_wheels, start=len(robot.driven_wheels)):
+            matrix[row[names.swivel_joint(wheel.name)], column] = 1.0
+        return matrix
+
+    def wheel_speed_matrix(self) -> NDArray[np.float64]:
+        """Matrix (n_driven, nq + nv) from the robot's state [q; v] to the speeds of its driven wheels."""
+        plant, instance = self.plant, self.model_instance
+        offset = plant.num_positions(instance)
+        matrix = np.zeros((len(self.robot.driven_wheels), plant.num_multibody_states(instance)))
+        for row, wheel in enumerate(self.robot.driven_wheels):
+            matrix[row, offset + self.velocity_index(self.drive_joint(wheel))] = 1.0
+        return matrix
+
+    def body_state_matrix(self) -> NDArray[np.float64]:
+        """Matrix (13, nq + nv) from the robot's state to its body's [quaternion, p_WB, w_WB_W, v_WB_W]."""
+        plant, instance = self.plant, self.model_instance
+        matrix = np.zeros((13, plant.num_multibody_states(instance)))
+        q = self.body_position_index
+        v = plant.num_positions(instance) + self.body_velocity_index
+        matrix[range(7), range(q, q + 7)] = 1.0
+        matrix[range(7, 13), range(v, v + 6)] = 1.0
+        return matrix
+
+    @property
+    def body_position_index(self) -> int:
+        """Where the body's quaternion and position start in the robot's positions."""
+        return int(self.body.floating_positions_start()) - self._first_position
+
+    @property
+    def body_velocity_index(self) -> int:
+        """Where the body's angular and linear velocity start in the robot's velocities."""
+        return int(self.body.floating_velocities_start_in_v()) - self._first_velocity
+
+    def position_index(self, joint: RevoluteJoint) -> int:
+        """Index of a joint's angle in the robot's positions."""
+        return int(joint.position_start()) - self._first_position
+
+    def velocity_index(self, joint: RevoluteJoint) -> int:
+        """Index of a joint's rate in the robot's velocities."""
+        return int(joint.velocity_start()) - self._first_velocity
+
+    def set_pose(self, context: Context, q_xyt: ArrayLike) -> None:
+        """Stands the robot on level ground at a planar pose (3,) in W, sunk in by what its weight will do."""
+        x, y, yaw = np.asarray(q_xyt, dtype=np.float64)
+        height = -self.robot.ground_height - static_penetration(self.robot)
+        pose = RigidTransform(RollPitchYaw(0.0, 0.0, yaw), [x, y, height])
+        self.plant.SetFreeBodyPose(context, self.body, pose)
+
+    @property
+    def _first_position(self) -> int:
+        return min(self.plant.get_joint(i).position_start() for i in self._joints) if self._joints else 0
+
+    @property
+    def _first_velocity(self) -> int:
+        return min(self.plant.get_joint(i).velocity_start() for i in self._joints) if self._joints else 0
+
+    @property
+    def _joints(self) -> list[JointIndex]:
+        """Joints with coordinates, the body's free one included; a model's coordinates follow each other."""
+        indices = self.plant.GetJointIndices(self.model_instance)
+        return [i for i in indices if self.plant.get_joint(i).num_velocities()]
+
+    def _joint(self, name: str) -> RevoluteJoint:
+        return self.plant.GetJointByName(name, self.model_instance)
+
+
+def add_robot(
+    plant: MultibodyPlant,
+    robot: Robot | str | Path | Mapping[str, Any],
+    *,
+    gains: ServoGains | None = None,
+) -> RobotModel:
+    """Adds a robot with all its rollers to a plant that is not finalized, servo gains set.
+
+    Args:
+        plant: The plant.
+        robot: Robot, name of a shipped one, or path to a robot.yaml.
+        gains: Gains of the servos; by default those of `servo_gains(robot)`.
+    """
+    robot = load_robot(robot)
+    parser = Parser(plant)
+    parser.SetAutoRenaming(True)
+    (instance,) = parser.AddModelsFromString(robot_to_sdf(robot), "sdf")
+    model = RobotModel(
+        robot=robot, plant=plant, model_instance=instance, body=plant.GetBodyByName(names.BODY, instance)
+    )
+    gains = gains or servo_gains(robot)
+    for wheel in robot.driven_wheels:
+        actuator = plant.GetJointActuatorByName(names.drive_joint(wheel.name), instance)
+        actuator.set_controller_gains(PdControllerGains(p=0.0, d=gains.drive_damping[wheel.name]))
+    for wheel in robot.steered_wheels:
+        actuator = plant.GetJointActuatorByName(names.swivel_joint(wheel.name), instance)
+        actuator.set_controller_gains(
+            PdControllerGains(p=gains.steering_stiffness[wheel.name], d=gains.steering_damping[wheel.name])
+        )
+    return model

@@ -1,0 +1,134 @@
+"""What a run recorded: columns over time, in one Parquet file."""
+
+import io
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from rollerbench.errors import ResourceError
+
+Array = NDArray[np.float64]
+
+ROBOT_COLUMNS: dict[str, str] = {
+    "time": "s",
+    **{name: "m" for name in ("x", "y", "z")},
+    **{name: "rad" for name in ("roll", "pitch", "yaw")},
+    **{"vx": "m/s", "vy": "m/s", "wz": "rad/s"},
+    **{f"reference_{name}": unit for name, unit in (("x", "m"), ("y", "m"), ("yaw", "rad"))},
+    **{f"reference_{name}": unit for name, unit in (("vx", "m/s"), ("vy", "m/s"), ("wz", "rad/s"))},
+    **{f"odometry_{name}": unit for name, unit in (("x", "m"), ("y", "m"), ("yaw", "rad"))},
+}
+"""Columns of the robot and their units. Poses of B in W, twists in B turned upright."""
+
+WHEEL_COLUMNS: dict[str, str] = {
+    "angle": "rad",
+    "speed": "rad/s",
+    "command": "rad/s",
+    "effort": "N m",
+    "swivel": "rad",
+    "contact_x": "m",
+    "contact_y": "m",
+    "depth": "m",
+    "slip_x": "m/s",
+    "slip_y": "m/s",
+}
+"""Columns of each wheel, named wheel.column, and their units.
+
+command and effort are NaN for wheels without a motor. contact_x and contact_y are where the wheel touches the ground,
+from Bo along the axes of B turned upright; slip_x and slip_y are the velocity of the wheel's or roller's surface over
+the ground along them; depth is the penetration, negative in the air.
+"""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Recording:
+    """Samples of a run, one per step of the plant.
+
+    Attributes:
+        columns: Arrays (n,) by name: `ROBOT_COLUMNS`, and `WHEEL_COLUMNS` of each wheel as "wheel.column".
+        wheel_names: Names of the wheels in the order of robot.yaml.
+        metadata: Names and versions that tell where the recording comes from.
+    """
+
+    columns: Mapping[str, Array]
+    wheel_names: tuple[str, ...]
+    metadata: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def time(self) -> Array:
+        """Times (n,) [s]."""
+        return self.columns["time"]
+
+    @property
+    def q_xyt(self) -> Array:
+        """Simulated poses (n, 3); the yaw counts full turns [m, m, rad]."""
+        return self._stack("x", "y", "yaw")
+
+    @property
+    def v_xyw_B(self) -> Array:
+        """Simulated twists (n, 3) [m/s, m/s, rad/s]."""
+        return self._stack("vx", "vy", "wz")
+
+    @property
+    def reference_q_xyt(self) -> Array:
+        """Poses (n, 3) that the equations give for the command [m, m, rad]."""
+        return self._stack("reference_x", "reference_y", "reference_yaw")
+
+    @property
+    def reference_v_xyw_B(self) -> Array:
+        """Twists (n, 3) of the reference [m/s, m/s, rad/s]."""
+        return self._stack("reference_vx", "reference_vy", "reference_wz")
+
+    @property
+    def odometry_q_xyt(self) -> Array:
+        """Poses (n, 3) that the equations give for the measured wheel speeds [m, m, rad]."""
+        return self._stack("odometry_x", "odometry_y", "odometry_yaw")
+
+    def wheels(self, column: str) -> Array:
+        """One of `WHEEL_COLUMNS` for all wheels, (n, n_wheels)."""
+        return self._stack(*(f"{name}.{column}" for name in self.wheel_names))
+
+    def to_bytes(self) -> bytes:
+        """The recording as a Parquet file; units are in the columns' metadata."""
+        fields = [pa.field(name, pa.float64(), metadata={"unit": _unit(name)}) for name in self.columns]
+        metadata = {"wheels": json.dumps(self.wheel_names), **{k: json.dumps(v) for k, v in self.metadata.items()}}
+        table = pa.table([pa.array(column) for column in self.columns.values()], schema=pa.schema(fields, metadata))
+        sink = io.BytesIO()
+        pq.write_table(table, sink, compression="zstd")
+        return sink.getvalue()
+
+    @classmethod
+    def read(cls, path: str | Path) -> "Recording":
+        """Reads recording.parquet, given as the file or as the run folder.
+
+        Raises:
+            ResourceError: it is not there, or not a recording.
+        """
+        file = Path(path) / "recording.parquet" if Path(path).is_dir() else Path(path)
+        try:
+            table = pq.read_table(file)
+        except (OSError, pa.ArrowInvalid) as error:
+            raise ResourceError(f"{file}: cannot be read as a recording: {error}") from error
+        metadata = {key.decode(): json.loads(value) for key, value in (table.schema.metadata or {}).items()}
+        missing = [name for name in ROBOT_COLUMNS if name not in table.column_names]
+        if missing or "wheels" not in metadata:
+            raise ResourceError(f"{file}: not a recording of rollerbench: it lacks {', '.join(missing) or 'wheels'}")
+        return cls(
+            columns={name: table[name].to_numpy() for name in table.column_names},
+            wheel_names=tuple(metadata.pop("wheels")),
+            metadata=metadata,
+        )
+
+    def _stack(self, *names: str) -> Array:
+        return np.column_stack([self.columns[name] for name in names])
+
+
+def _unit(name: str) -> str:
+    return ROBOT_COLUMNS.get(name) or WHEEL_COLUMNS[name.rpartition(".")[2]]

@@ -1,0 +1,46 @@
+"""Key figures of a run as labelled text, for tables on terminals and pages."""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+Row = tuple[str, str]
+
+
+def summary_rows(summary: Mapping[str, Any]) -> list[Row]:
+    """Label and value of each key figure in a summary."""
+    error = summary["pose_error"]
+    rows = [
+        ("Robot", summary["robot"]),
+        ("Simulated time", f"{summary['duration']:.3f} s"),
+        ("Path, rotation", f"{summary['path_length']:.4f} m, {_degrees(summary['rotation'])}"),
+        ("Reference pose", _pose(summary["reference_final_pose"])),
+        ("Simulated pose", _pose(summary["simulated_final_pose"])),
+        ("Odometry pose", _pose(summary["odometry_final_pose"])),
+        ("Position error", f"{_mm(error['final_position'])}{_percent(error['percent_of_path'])}"),
+        ("  ahead, left", f"{_mm(error['along_track'])}, {_mm(error['cross_track'])}"),
+        ("  largest", _mm(error["max_position"])),
+        ("Yaw error", f"{_degrees(error['final_yaw'])}, largest {_degrees(error['max_yaw'])}"),
+        ("Wheel slip", f"rms {_mm(summary['wheel_slip']['rms'])}/s, largest {_mm(summary['wheel_slip']['max'])}/s"),
+        ("Height ripple", f"{_mm(summary['height_ripple'])}"),
+        ("Real-time factor", f"{summary['realtime_factor']:.1f}"),
+    ]
+    if summary["failure"]:
+        rows.insert(0, ("Failed", summary["failure"]))
+    return rows
+
+
+def _mm(metres: float) -> str:
+    return f"{1e3 * metres:.3f} mm"
+
+
+def _degrees(radians: float) -> str:
+    return f"{math.degrees(radians):.4f} deg"
+
+
+def _pose(pose: list[float]) -> str:
+    return f"x {pose[0]:.4f} m, y {pose[1]:.4f} m, yaw {_degrees(pose[2])}"
+
+
+def _percent(percent: float | None) -> str:
+    return "" if percent is None else f" ({percent:.3f} % of the path)"

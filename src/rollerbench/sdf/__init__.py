@@ -1,0 +1,5 @@
+"""Robot descriptions as models for simulators."""
+
+from rollerbench.sdf.robot import robot_to_sdf
+
+__all__ = ["robot_to_sdf"]

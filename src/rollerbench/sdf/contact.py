@@ -1,0 +1,30 @@
+"""Contact parameters that follow from a robot's weight and wheels."""
+
+import math
+
+from rollerbench.description import Robot
+
+GRAVITY = 9.81
+"""Standard value used for derived parameters; Drake's default too [m/s2]."""
+
+PENETRATION_RATIO = 6e-4
+"""Static penetration of a wheel into rigid ground, as a share of its radius: by so much the wheel rolls short [-]."""
+
+
+def static_penetration(robot: Robot) -> float:
+    """Depth by which the wheels sink into rigid ground under the robot's weight [m]."""
+    return PENETRATION_RATIO * min(wheel.radius for wheel in robot.wheels)
+
+
+def contact_stiffness(robot: Robot) -> float:
+    """Stiffness of a wheel's contact with rigid ground [N/m], by which a wheel with an even share sinks as above."""
+    load = robot.mass * GRAVITY / len(robot.wheels)
+    return load / static_penetration(robot)
+
+
+def contact_dissipation(robot: Robot) -> float:
+    """Hunt-Crossley dissipation d [s/m] of force k x (1 + d x') that damps bouncing at half of critical.
+
+    Under the load m g = k x0 the contact is a spring k with the damper k x0 d; it is critical at d = 2 / sqrt(g x0).
+    """
+    return 1.0 / math.sqrt(GRAVITY * static_penetration(robot))

@@ -1,0 +1,7 @@
+"""Scenarios, the diagram that simulates them, and runs."""
+
+from rollerbench.simulation.run import RunResult, run
+from rollerbench.simulation.scenario import Scenario, load_scenario
+from rollerbench.simulation.station import Station, build_station
+
+__all__ = ["RunResult", "Scenario", "Station", "build_station", "load_scenario", "run"]

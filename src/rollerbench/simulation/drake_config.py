@@ -1,0 +1,56 @@
+"""Drake's configuration structs from scenarios, checked before Drake sees them."""
+
+from collections.abc import Mapping
+from typing import Any, TypeVar
+
+from pydrake.multibody.plant import MultibodyPlantConfig
+from pydrake.systems.analysis import SimulatorConfig
+
+from rollerbench.description.problems import Problem
+from rollerbench.errors import DescriptionError
+from rollerbench.simulation.scenario import Scenario
+
+Config = TypeVar("Config", MultibodyPlantConfig, SimulatorConfig)
+
+OURS = {"discrete_contact_approximation": "contact_approximation"}
+
+
+def plant_config(scenario: Scenario) -> MultibodyPlantConfig:
+    """Settings of the plant: the scenario's, and for the rest those that rollers need.
+
+    Raises:
+        DescriptionError: an unknown field, or a value of the wrong kind.
+    """
+    settings = scenario.plant
+    config = MultibodyPlantConfig(
+        time_step=settings.time_step,
+        contact_model="point",
+        discrete_contact_approximation=settings.contact_approximation,
+        use_sampled_output_ports=False,
+    )
+    return _apply("plant", config, settings.model_extra or {})
+
+
+def simulator_config(scenario: Scenario) -> SimulatorConfig:
+    """Settings of the simulator.
+
+    Raises:
+        DescriptionError: an unknown field, or a value of the wrong kind.
+    """
+    return _apply("simulator", SimulatorConfig(), scenario.simulator.model_extra or {})
+
+
+def _apply(section: str, config: Config, extra: Mapping[str, Any]) -> Config:
+    names = [field.name for field in type(config).__fields__]
+    for name, value in extra.items():
+        accepted = f"accepted: {', '.join(sorted(set(names) - OURS.keys()))}"
+        if name in OURS:
+            raise DescriptionError(str(Problem((section, name), f"use {section}.{OURS[name]}", value)))
+        if name not in names:
+            raise DescriptionError(str(Problem((section, name), f"not a field of Drake's; {accepted}", value)))
+        try:
+            setattr(config, name, value)
+        except TypeError as error:
+            kind = type(getattr(config, name)).__name__
+            raise DescriptionError(str(Problem((section, name), f"accepted: {kind}", value))) from error
+    return config

@@ -1,0 +1,291 @@
+"""What a run simulates: robot, command, controller, plant, ground. From and to scenario.yaml."""
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BeforeValidator, ConfigDict, Field, ValidationInfo, model_validator
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
+
+from rollerbench.description import Robot, load_robot
+from rollerbench.description.files import read_yaml, validate
+from rollerbench.description.part import Flag, Name, NonNegative, Number, Part, Positive, Vector3
+from rollerbench.description.problems import Problem, refuse
+from rollerbench.errors import DescriptionError
+from rollerbench.kinematics import WheelKinematics
+from rollerbench.kinematics.profile import Profile, held_with_ramps
+from rollerbench.plant.servo import DRIVE_TIME_CONSTANT
+from rollerbench.resources import scenario_file
+
+
+class TwistCommand(Part):
+    """A constant body twist between smooth ramps.
+
+    Attributes:
+        v_xyw_B: Twist [vx, vy, wz] that is held [m/s, m/s, rad/s].
+        ramp: Time of the smooth start, and of the smooth stop [s]; one step of the plant at least.
+    """
+
+    type: Literal["twist"] = "twist"
+    v_xyw_B: Vector3
+    ramp: NonNegative = 0.5
+
+
+class WheelSpeedsCommand(Part):
+    """Constant wheel speeds between smooth ramps.
+
+    Attributes:
+        wheel_speeds: Speeds of the driven wheels by name [rad/s]; 0 for those left out.
+        ramp: Time of the smooth start, and of the smooth stop [s]; one step of the plant at least.
+    """
+
+    type: Literal["wheel_speeds"] = "wheel_speeds"
+    wheel_speeds: dict[str, Number]
+    ramp: NonNegative = 0.5
+
+
+Command = Annotated[TwistCommand | WheelSpeedsCommand, Field(discriminator="type")]
+
+
+class OpenLoop(Part):
+    """Wheel speeds from the command by inverse kinematics, without feedback of the pose.
+
+    Attributes:
+        servo_time_constant: Time in which the wheel servos make up a speed difference of the whole robot [s].
+    """
+
+    type: Literal["open_loop"] = "open_loop"
+    servo_time_constant: Positive = DRIVE_TIME_CONSTANT
+
+
+class PlantSettings(Part):
+    """How Drake simulates. Any further field of Drake's MultibodyPlantConfig is passed on.
+
+    Attributes:
+        roller_model: "full": every roller is a body.
+        time_step: Step of the discrete plant [s].
+        contact_approximation: Drake's discrete contact approximation. The others creep or ignore the servos.
+    """
+
+    model_config = ConfigDict(extra="allow")
+
+    roller_model: Literal["full"] = "full"
+    time_step: Annotated[Positive, Field(le=0.1)] = 0.005
+    contact_approximation: Literal["lagged", "similar"] = "lagged"
+
+
+class Ground(Part):
+    """What the robot stands on.
+
+    Attributes:
+        friction: Coefficient of friction; with a wheel's it combines to 2ab/(a+b).
+        slope_deg: Inclination; the world's x axis points uphill.
+        roll_resistance: Rolling resistance over load; only 0 can be simulated yet.
+    """
+
+    friction: Positive = 0.8
+    slope_deg: Annotated[Number, Field(gt=-90, lt=90)] = 0.0
+    roll_resistance: Annotated[Number, Field(ge=0, le=0)] = 0.0
+
+
+class Errors(Part):
+    """What differs from robot.yaml in the simulated robot; nothing can be set yet."""
+
+
+class SimulatorSettings(Part):
+    """Any field of Drake's SimulatorConfig."""
+
+    model_config = ConfigDict(extra="allow")
+
+
+class RecordingSettings(Part):
+    """What a run leaves behind.
+
+    Attributes:
+        html: Whether to write the self-contained Meshcat page recording.html.
+        frames_per_second: Frames of that page [1/s].
+    """
+
+    html: Flag = True
+    frames_per_second: Annotated[Positive, Field(le=200)] = 30.0
+
+
+def _robot_from(value: Any, info: ValidationInfo) -> Robot:
+    """A Robot from its description, or from a name or path, which is relative to the scenario's folder."""
+    folder = (info.context or {}).get("folder")
+    if isinstance(value, str) and folder is not None and (Path(folder) / value).is_file():
+        return load_robot(Path(folder) / value)
+    if isinstance(value, str | Path | Mapping | Robot):
+        return load_robot(value)
+    raise ValueError("accepted: the name of a shipped robot, a path to a robot.yaml, or a robot's description")
+
+
+class Scenario(Part):
+    """One run, fully described.
+
+    Attributes:
+        name: Name of the scenario.
+        summary: One line for lists.
+        robot: The robot; in YAML its name, a path relative to the scenario's file, or its description.
+        duration: Simulated time [s].
+        command: What the robot is asked to do.
+        controller: How the command becomes wheel speeds.
+        plant: How Drake simulates.
+        ground: What the robot stands on.
+        errors: What differs from robot.yaml in the simulated robot.
+        simulator: Further settings of Drake's simulator.
+        recording: What the run leaves behind.
+        seed: Seed of everything random.
+    """
+
+    name: Name
+    summary: str = ""
+    robot: Annotated[Robot, BeforeValidator(_robot_from)]
+    duration: Positive
+    command: Command
+    controller: OpenLoop = OpenLoop()
+    plant: PlantSettings = PlantSettings()
+    ground: Ground = Ground()
+    errors: Errors = Errors()
+    simulator: SimulatorSettings = SimulatorSettings()
+    recording: RecordingSettings = RecordingSettings()
+    seed: Annotated[int, Field(strict=True, ge=0)] = 0
+
+    @model_validator(mode="after")
+    def _command_fits(self) -> Self:
+        problems = []
+        if 2 * self.command.ramp > self.duration:
+            message = f"start and stop do not fit into duration = {self.duration}; accepted: up to {self.duration / 2:g}"
+            problems.append(Problem(("command", "ramp"), message, self.command.ramp))
+        if self.plant.time_step > self.duration:
+            message = f"accepted: at most the duration, {self.duration:g}"
+            problems.append(Problem(("plant", "time_step"), message, self.plant.time_step))
+        if isinstance(self.command, WheelSpeedsCommand):
+            names = [wheel.name for wheel in self.robot.driven_wheels]
+            for name in self.command.wheel_speeds.keys() - set(names):
+                message = f"not a driven wheel of {self.robot.name}; accepted: {', '.join(names) or 'none'}"
+                problems.append(Problem(("command", "wheel_speeds", name), message))
+        refuse(problems)
+        return self
+
+    @property
+    def kinematics(self) -> WheelKinematics:
+        """The equations that the controller uses; steered wheels stand as the command needs them."""
+        kinematics = WheelKinematics(self.robot)
+        if isinstance(self.command, TwistCommand) and self.robot.steered_wheels:
+            angles, _ = kinematics.steering(self.command.v_xyw_B)
+            names = [wheel.name for wheel in self.robot.steered_wheels]
+            return kinematics.swivelled({name: float(a) for name, a in zip(names, angles, strict=True)})
+        return kinematics
+
+    @property
+    def wheel_speed_profile(self) -> Profile:
+        """Commanded wheel speeds (n_driven) over time.
+
+        Raises:
+            InfeasibleTwist: the commanded twist would make a tyre skid.
+        """
+        if isinstance(self.command, TwistCommand):
+            kinematics = self.kinematics
+            kinematics.require_feasible(self.command.v_xyw_B)
+            return self.twist_profile.mapped(kinematics.drive_matrix)
+        speeds = self.command.wheel_speeds
+        return self._held([speeds.get(wheel.name, 0.0) for wheel in self.robot.driven_wheels])
+
+    @property
+    def twist_profile(self) -> Profile:
+        """Body twist (3) over time that the equations give for the command.
+
+        Raises:
+            KinematicsError: wheel speeds are commanded, and they do not determine the twist.
+        """
+        if isinstance(self.command, TwistCommand):
+            return self._held(self.command.v_xyw_B)
+        return self.wheel_speed_profile.mapped(self.kinematics.forward_matrix)
+
+    def _held(self, value: Sequence[float]) -> Profile:
+        ramp = min(max(self.command.ramp, self.plant.time_step), 0.5 * self.duration)
+        return held_with_ramps(value, self.duration, ramp)
+
+    def step_rule(self) -> tuple[float, str | None]:
+        """Largest plant step that follows the rollers' hand-over at the commanded speeds [s], and the wheel that needs it.
+
+        A wheel may turn by a sixth of its roller pitch in a step. Infinite if no wheel with rollers is commanded.
+        """
+        peak = self.wheel_speed_profile.peak
+        limits = {
+            wheel.name: wheel.ring.pitch / 6 / speed
+            for wheel, speed in zip(self.robot.driven_wheels, peak, strict=True)
+            if wheel.ring is not None and speed > 0
+        }
+        if not limits:
+            return math.inf, None
+        name = min(limits, key=limits.__getitem__)
+        return float(limits[name]), name
+
+
+def load_scenario(
+    source: str | Path | Mapping[str, Any] | Scenario,
+    *,
+    overrides: Mapping[str, Any] | Sequence[str] = (),
+    robot: str | Path | Robot | None = None,
+) -> Scenario:
+    """A scenario from the name of a shipped one, a path to a scenario.yaml, or its content.
+
+    Args:
+        source: The scenario.
+        overrides: Fields to replace, by dotted path: {"plant.time_step": 0.002} or ["plant.time_step=0.002"].
+        robot: Another robot than the scenario's.
+
+    Raises:
+        ResourceError: there is no such scenario or robot.
+        DescriptionError: it is not valid; the message names file, line, field, value and what is accepted.
+    """
+    path = None
+    if isinstance(source, Scenario):
+        data: Any = {name: getattr(source, name) for name in Scenario.model_fields}
+        if not isinstance(overrides, Mapping) and not overrides and robot is None:
+            return source
+        data = {name: v if isinstance(v, Robot) else _dumped(v) for name, v in data.items()}
+    elif isinstance(source, Mapping):
+        data = dict(source)
+    else:
+        path = scenario_file(source)
+        data = read_yaml(path)
+    for key, value in _parsed(overrides).items():
+        _set(data, key, value)
+    if robot is not None:
+        data["robot"] = load_robot(robot)
+    return validate(Scenario, data, path)
+
+
+def _dumped(value: Any) -> Any:
+    return value.model_dump(mode="json") if isinstance(value, Part) else value
+
+
+def _parsed(overrides: Mapping[str, Any] | Sequence[str]) -> dict[str, Any]:
+    if isinstance(overrides, Mapping):
+        return dict(overrides)
+    result = {}
+    for text in overrides:
+        key, equals, value = text.partition("=")
+        if not (key and equals):
+            raise DescriptionError(f"--set {text!r}: accepted: KEY=VALUE, such as plant.time_step=0.002")
+        try:
+            result[key.strip()] = YAML(typ="safe", pure=True).load(value)
+        except YAMLError as error:
+            raise DescriptionError(f"--set {text!r}: the value is not valid YAML") from error
+    return result
+
+
+def _set(data: Any, dotted: str, value: Any) -> None:
+    *path, last = dotted.split(".")
+    for step in path:
+        if step not in data or data[step] is None:
+            data[step] = {}
+        data = data[step]
+        if not isinstance(data, dict):
+            raise DescriptionError(f"--set {dotted}: {step} has no fields")
+    data[last] = value

@@ -1,0 +1,186 @@
+"""The diagram that a scenario simulates: command, kinematics, servo, plant."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from pydrake.geometry import Meshcat, SceneGraph
+from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant
+from pydrake.systems.framework import Diagram, DiagramBuilder, OutputPort
+from pydrake.systems.primitives import (
+    ConstantVectorSource,
+    LogVectorOutput,
+    MatrixGain,
+    Multiplexer,
+    TrajectorySource,
+    VectorLogSink,
+)
+from pydrake.trajectories import PiecewisePolynomial
+
+from rollerbench.errors import DescriptionError
+from rollerbench.kinematics.profile import Profile
+from rollerbench.plant import RobotModel, add_ground, add_robot, servo_gains
+from rollerbench.simulation.drake_config import plant_config
+from rollerbench.simulation.scenario import Scenario, TwistCommand
+from rollerbench.systems import InverseKinematics, Odometry, PlanarState
+from rollerbench.visualization.scene import add_ground_visual, add_meshcat
+
+
+@dataclass(frozen=True, kw_only=True)
+class StationParts:
+    """Subsystems of a station.
+
+    Attributes:
+        model: The robot in the plant.
+        scene_graph: The plant's scene graph.
+        odometry: The odometry.
+        logs: Log sinks by the name of the exported output port that they record, one sample a step of the plant.
+    """
+
+    model: RobotModel
+    scene_graph: SceneGraph
+    odometry: Odometry
+    logs: dict[str, VectorLogSink]
+
+
+class Station(Diagram):
+    """A robot on its ground, driven by a scenario's command.
+
+    Input ports:
+        v_xyw_B (3): body twist command [m/s, m/s, rad/s]; only if the command comes from outside.
+    Output ports:
+        state (nq + nv): state of the robot's model instance, as the plant orders it.
+        q_xyt (3): pose of B in W, yaw in (-pi, pi] [m, m, rad].
+        v_xyw_B (3): twist in B turned upright [m/s, m/s, rad/s].
+        wheel_speed_command (n_driven): commanded wheel speeds [rad/s].
+        wheel_speeds (n_driven): measured wheel speeds [rad/s].
+        net_actuation (n_actuators): torques of the servos [N m].
+        odometry_q_xyt (3): pose from the measured wheel speeds [m, m, rad].
+        contact_results: Drake's ContactResults.
+        query_object: Drake's QueryObject.
+
+    Attributes:
+        parts: Subsystems.
+    """
+
+    parts: StationParts
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        *,
+        command: Literal["scenario", "external"] = "scenario",
+        meshcat: Meshcat | None = None,
+        log: bool = False,
+    ) -> None:
+        """Builds the diagram of a scenario.
+
+        Args:
+            scenario: What to simulate.
+            command: "scenario" drives the robot as the scenario says; "external" exports the input v_xyw_B.
+            meshcat: Where to show the robot.
+            log: Whether to record outputs (see `StationParts.logs`).
+
+        Raises:
+            DescriptionError: Drake refuses a setting of the plant.
+            InfeasibleTwist: the command would make a tyre skid.
+        """
+        super().__init__()
+        builder = DiagramBuilder()
+        plant, scene_graph = _add_plant(builder, scenario)
+        gains = servo_gains(scenario.robot, time_constant=scenario.controller.servo_time_constant)
+        model = add_robot(plant, scenario.robot, gains=gains)
+        add_ground(plant, friction=scenario.ground.friction, slope_deg=scenario.ground.slope_deg)
+        if meshcat is not None:
+            add_ground_visual(plant, scenario.robot)
+        plant.Finalize()
+
+        command_port = _add_command(builder, scenario, external=command == "external")
+        _connect_servo(builder, scenario, model, command_port)
+        outputs = {
+            "state": plant.get_state_output_port(model.model_instance),
+            "wheel_speed_command": command_port,
+            "net_actuation": plant.get_net_actuation_output_port(model.model_instance),
+            "contact_results": plant.get_contact_results_output_port(),
+            "query_object": scene_graph.get_query_output_port(),
+        }
+        speeds = builder.AddNamedSystem("wheel_speed_sensor", MatrixGain(model.wheel_speed_matrix()))
+        builder.Connect(outputs["state"], speeds.get_input_port())
+        outputs["wheel_speeds"] = speeds.get_output_port()
+        body = builder.AddNamedSystem("body_state", MatrixGain(model.body_state_matrix()))
+        builder.Connect(outputs["state"], body.get_input_port())
+        planar = builder.AddNamedSystem("planar_state", PlanarState())
+        builder.Connect(body.get_output_port(), planar.GetInputPort("state"))
+        outputs |= {name: planar.GetOutputPort(name) for name in ("q_xyt", "v_xyw_B")}
+        odometry = builder.AddNamedSystem("odometry", Odometry(scenario.kinematics, scenario.plant.time_step))
+        builder.Connect(outputs["wheel_speeds"], odometry.GetInputPort("wheel_speeds"))
+        outputs["odometry_q_xyt"] = odometry.GetOutputPort("q_xyt")
+        for name, port in outputs.items():
+            builder.ExportOutput(port, name)
+
+        logs = {}
+        if log:
+            for name in ("state", "wheel_speed_command", "net_actuation", "odometry_q_xyt"):
+                logs[name] = LogVectorOutput(outputs[name], builder, publish_period=scenario.plant.time_step)
+        if meshcat is not None:
+            add_meshcat(builder, scene_graph, meshcat, scenario.recording.frames_per_second)
+        builder.BuildInto(self)
+        self.parts = StationParts(model=model, scene_graph=scene_graph, odometry=odometry, logs=logs)
+
+
+def build_station(
+    scenario: Scenario,
+    *,
+    command: Literal["scenario", "external"] = "scenario",
+    meshcat: Meshcat | None = None,
+) -> Station:
+    """The diagram of a scenario, to simulate or to compose with other systems. See `Station`."""
+    return Station(scenario, command=command, meshcat=meshcat)
+
+
+def _add_plant(builder: DiagramBuilder, scenario: Scenario) -> tuple[MultibodyPlant, SceneGraph]:
+    config = plant_config(scenario)
+    try:
+        return AddMultibodyPlant(config, builder)
+    except (RuntimeError, SystemExit) as error:
+        raise DescriptionError(f"plant: Drake refuses these settings: {error}") from error
+
+
+def _add_command(builder: DiagramBuilder, scenario: Scenario, *, external: bool) -> OutputPort:
+    """The output port of the commanded wheel speeds."""
+    by_twist = external or isinstance(scenario.command, TwistCommand)
+    if not by_twist:
+        profile = scenario.wheel_speed_profile
+        return builder.AddNamedSystem("wheel_speed_command", _source(profile)).get_output_port()
+    kinematics = builder.AddNamedSystem("inverse_kinematics", InverseKinematics(scenario.kinematics))
+    if external:
+        builder.ExportInput(kinematics.GetInputPort("v_xyw_B"), "v_xyw_B")
+    else:
+        scenario.kinematics.require_feasible(scenario.twist_profile.values)
+        twist = builder.AddNamedSystem("twist_command", _source(scenario.twist_profile))
+        builder.Connect(twist.get_output_port(), kinematics.GetInputPort("v_xyw_B"))
+    return kinematics.GetOutputPort("wheel_speeds")
+
+
+def _connect_servo(
+    builder: DiagramBuilder, scenario: Scenario, model: RobotModel, command_port: OutputPort
+) -> None:
+    robot, plant = scenario.robot, model.plant
+    if not model.actuators:
+        return
+    servo = builder.AddNamedSystem("servo_command", MatrixGain(model.desired_state_matrix()))
+    builder.Connect(servo.get_output_port(), plant.get_desired_state_input_port(model.model_instance))
+    if not robot.steered_wheels:
+        builder.Connect(command_port, servo.get_input_port())
+        return
+    swivel = dict(zip(robot.wheel_names, scenario.kinematics.swivel_angles, strict=True))
+    angles = [float(swivel[wheel.name]) for wheel in robot.steered_wheels]
+    steering = builder.AddNamedSystem("steering_command", ConstantVectorSource(angles))
+    both = builder.AddNamedSystem("motor_commands", Multiplexer([command_port.size(), len(angles)]))
+    builder.Connect(command_port, both.get_input_port(0))
+    builder.Connect(steering.get_output_port(), both.get_input_port(1))
+    builder.Connect(both.get_output_port(), servo.get_input_port())
+
+
+def _source(profile: Profile) -> TrajectorySource:
+    trajectory = PiecewisePolynomial.CubicHermite(profile.breaks, profile.values.T, profile.slopes.T)
+    return TrajectorySource(trajectory)

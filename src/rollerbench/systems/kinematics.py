@@ -1,0 +1,153 @@
+"""The wheels' kinematics as Drake Systems.
+
+Each is a Diagram of Drake's own C++ systems behind named ports: as fast as C++, and convertible to AutoDiffXd and
+Expression with ToAutoDiffXd() and ToSymbolic().
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydrake.symbolic import Expression, Variable, atan2, cos, sin, sqrt
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder
+from pydrake.systems.primitives import MatrixGain, SymbolicVectorSystem
+
+from rollerbench.description import Robot
+from rollerbench.errors import KinematicsError
+from rollerbench.kinematics import WheelKinematics
+
+AnyRobot = Robot | WheelKinematics | str | Path | Mapping[str, Any]
+
+
+class InverseKinematics(Diagram):
+    """Wheel speeds that move the body at a twist: wheel_speeds = J @ v_xyw_B.
+
+    Input ports:
+        v_xyw_B (3): body twist [m/s, m/s, rad/s].
+    Output ports:
+        wheel_speeds (n_driven): in the order of robot.yaml [rad/s].
+
+    Twists at which a tyre would skid are not refused here (a System cannot): see `WheelKinematics.require_feasible`.
+    """
+
+    def __init__(self, robot: AnyRobot) -> None:
+        super().__init__()
+        _wrap_gain(self, _kinematics(robot).drive_matrix, "v_xyw_B", "wheel_speeds")
+
+
+class ForwardKinematics(Diagram):
+    """Body twist of the wheel speeds, by least squares: `WheelKinematics.forward`.
+
+    Input ports:
+        wheel_speeds (n_driven): in the order of robot.yaml [rad/s].
+    Output ports:
+        v_xyw_B (3): body twist [m/s, m/s, rad/s].
+    """
+
+    def __init__(self, robot: AnyRobot) -> None:
+        super().__init__()
+        _wrap_gain(self, _kinematics(robot).forward_matrix, "wheel_speeds", "v_xyw_B")
+
+
+class Odometry(Diagram):
+    """Pose from wheel speeds, advanced every time step by the exponential of SE(2) as `odometry.integrate` does.
+
+    Input ports:
+        wheel_speeds (n_driven): in the order of robot.yaml [rad/s].
+    Output ports:
+        q_xyt (3): pose of B in W; the yaw counts full turns [m, m, rad].
+    """
+
+    _INTEGRATOR = "integrator"
+
+    def __init__(self, robot: AnyRobot, time_step: float) -> None:
+        """Builds the diagram; the pose starts at the origin (see `set_pose`).
+
+        Args:
+            robot: The robot, or its kinematics.
+            time_step: Period of the updates [s].
+        """
+        super().__init__()
+        if not (np.isfinite(time_step) and time_step > 0):
+            raise KinematicsError(f"time_step = {time_step}: accepted: a positive number of seconds")
+        builder = DiagramBuilder()
+        twist = builder.AddNamedSystem("forward_kinematics", MatrixGain(_kinematics(robot).forward_matrix))
+        pose = builder.AddNamedSystem(self._INTEGRATOR, _se2_integrator(time_step))
+        builder.Connect(twist.get_output_port(), pose.get_input_port())
+        builder.ExportInput(twist.get_input_port(), "wheel_speeds")
+        builder.ExportOutput(pose.get_output_port(), "q_xyt")
+        builder.BuildInto(self)
+
+    def set_pose(self, context: Context, q_xyt: ArrayLike) -> None:
+        """Sets the pose (3,) in a context of this system."""
+        integrator = self.GetSubsystemByName(self._INTEGRATOR)
+        self.GetMutableSubsystemContext(integrator, context).SetDiscreteState(np.asarray(q_xyt, np.float64))
+
+
+class PlanarState(Diagram):
+    """Planar pose and twist of a free body from its state in a MultibodyPlant.
+
+    Input ports:
+        state (13): [quaternion w x y z, p_WB, w_WB_W, v_WB_W], as plants order a floating body's.
+    Output ports:
+        q_xyt (3): pose of B in W, yaw in (-pi, pi] [m, m, rad].
+        v_xyw_B (3): twist in B turned upright [m/s, m/s, rad/s].
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        builder = DiagramBuilder()
+        names = "w x y z px py pz wx wy wz vx vy vz"
+        state = [Variable(name) for name in names.split()]
+        w, x, y, z, px, py, _, _, _, wz, vx, vy, _ = state
+        # First column of the rotation, without its height; the norm of an imperfect quaternion drops out.
+        c, s = w * w + x * x - y * y - z * z, 2 * (x * y + w * z)
+        norm = sqrt(c * c + s * s)
+        outputs = {
+            "q_xyt": [Expression(px), Expression(py), atan2(s, c)],
+            "v_xyw_B": [(c * vx + s * vy) / norm, (c * vy - s * vx) / norm, Expression(wz)],
+        }
+        first = None
+        for name, expressions in outputs.items():
+            system = builder.AddNamedSystem(name, SymbolicVectorSystem(input=state, output=expressions))
+            if first is None:
+                first = builder.ExportInput(system.get_input_port(), "state")
+            else:
+                builder.ConnectInput(first, system.get_input_port())
+            builder.ExportOutput(system.get_output_port(), name)
+        builder.BuildInto(self)
+
+
+def _kinematics(robot: AnyRobot) -> WheelKinematics:
+    return robot if isinstance(robot, WheelKinematics) else WheelKinematics(robot)
+
+
+def _wrap_gain(diagram: Diagram, matrix: NDArray[np.float64], input_name: str, output_name: str) -> None:
+    builder = DiagramBuilder()
+    gain = builder.AddNamedSystem("gain", MatrixGain(matrix))
+    builder.ExportInput(gain.get_input_port(), input_name)
+    builder.ExportOutput(gain.get_output_port(), output_name)
+    builder.BuildInto(diagram)
+
+
+def _se2_integrator(time_step: float) -> SymbolicVectorSystem:
+    x, y, yaw = pose = [Variable(name) for name in ("x", "y", "yaw")]
+    vx, vy, wz = twist = [Variable(name) for name in ("vx", "vy", "wz")]
+    # sin(half)/half without a branch: the tiny summand keeps it exact to the last bit, at half = 0 too.
+    half = 0.5 * time_step * wz
+    away = sqrt(half * half + 1e-24)
+    chord = time_step * sin(away) / away
+    heading = yaw + half
+    return SymbolicVectorSystem(
+        state=pose,
+        input=twist,
+        dynamics=[
+            x + chord * (cos(heading) * vx - sin(heading) * vy),
+            y + chord * (sin(heading) * vx + cos(heading) * vy),
+            yaw + time_step * wz,
+        ],
+        output=[Expression(variable) for variable in pose],
+        time_period=time_step,
+    )

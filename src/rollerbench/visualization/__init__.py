@@ -1,0 +1,1 @@
+"""Meshcat scenes and recordings."""
