@@ -17,6 +17,7 @@ from rollerbench.description.mass import (
     roller_inertia,
     roller_poses_H,
 )
+from rollerbench.description.rollers import RollerRing
 from rollerbench.sdf import names
 from rollerbench.sdf.contact import contact_dissipation, contact_stiffness
 
@@ -28,6 +29,10 @@ TYRE_COLOR = (0.12, 0.12, 0.13)
 ROLLER_COLORS = ((0.12, 0.12, 0.13), (0.55, 0.55, 0.58))
 Z_TO_AXLE = Rotation.from_euler("x", 90, degrees=True)
 """Turns SDF's cylinders, which lie along z, onto the axle."""
+Z_TO_ROLLER_AXIS = Rotation.from_euler("y", 90, degrees=True)
+"""Turns SDF's cylinders onto a roller's axis."""
+BARREL_STEPS = (0.4, 0.7, 0.87, 1.0)
+"""Half lengths of the cylinders that show a roller, over that of its barrel [-]."""
 
 
 def robot_to_sdf(robot: Robot) -> str:
@@ -123,10 +128,21 @@ def _add_rollers(model: etree._Element, robot: Robot, wheel: RollerWheel) -> Non
         link = _add(model, "link", name=names.roller(wheel.name, index))
         _add_pose(link, center, Rotation.from_matrix(rotation), relative_to=hub)
         _add_inertial(link, roller_inertia(wheel))
-        _add_shape(link, "visual", "barrel", shape, color=ROLLER_COLORS[index % 2])
+        _add_barrel_visuals(link, ring, ROLLER_COLORS[index % 2])
         _add_contact(_add_shape(link, "collision", "barrel", shape), robot, friction=wheel.friction)
         joint = names.roller_joint(wheel.name, index)
         _add_joint(model, joint, hub, link.get("name"), "1 0 0", 0.0, damping=wheel.rollers.damping)
+
+
+def _add_barrel_visuals(link: etree._Element, ring: RollerRing, color: tuple[float, float, float]) -> None:
+    """Draws the part of the ellipsoid that ever touches the ground: cylinders of growing length inscribed in it."""
+    for step, share in enumerate(BARREL_STEPS):
+        half_length = share * ring.half_length
+        cylinder = _add(etree.Element("geometry"), "cylinder")
+        radius = ring.roller_radius * np.sqrt(1 - (half_length / ring.semi_axis) ** 2)
+        _add(cylinder, "radius", text=_number(radius))
+        _add(cylinder, "length", text=_number(2 * half_length))
+        _add_shape(link, "visual", f"barrel_{step}", cylinder, rotation=Z_TO_ROLLER_AXIS, color=color)
 
 
 def _add_joint(

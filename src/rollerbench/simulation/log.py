@@ -40,7 +40,10 @@ def recording_of(station: Station, scenario: Scenario, context: Context, metadat
     columns |= _named(("reference_x", "reference_y", "reference_yaw"), reference_poses(reference, time))
     columns |= _named(("reference_vx", "reference_vy", "reference_wz"), reference(time))
     columns |= _named(("odometry_x", "odometry_y", "odometry_yaw"), data["odometry_q_xyt"])
-    columns |= _wheel_columns(parts.model, motion, data["wheel_speed_command"], data["net_actuation"])
+    stepping = robot_motion(parts.model, _with_next_velocities(parts.model, data["state"]))
+    columns |= _wheel_columns(
+        parts.model, motion, stepping, data["wheel_speed_command"], data["net_actuation"]
+    )
     return Recording(columns=columns, wheel_names=scenario.robot.wheel_names, metadata=metadata)
 
 
@@ -72,14 +75,26 @@ def robot_motion(model: RobotModel, state: Array) -> RobotMotion:
     )
 
 
-def _wheel_columns(model: RobotModel, motion: RobotMotion, command: Array, effort: Array) -> dict[str, Array]:
+def _with_next_velocities(model: RobotModel, state: Array) -> Array:
+    """States (n, nq + nv) whose velocities are those of the next sample.
+
+    The discrete plant finds them from the contacts at the present positions: a roller that has just touched the ground
+    spins only in the next sample. So these, at these positions, are the velocities that show slip.
+    """
+    nq = model.plant.num_positions(model.model_instance)
+    return np.hstack([state[:, :nq], np.vstack([state[1:, nq:], state[-1:, nq:]])])
+
+
+def _wheel_columns(
+    model: RobotModel, motion: RobotMotion, stepping: RobotMotion, command: Array, effort: Array
+) -> dict[str, Array]:
     robot, yaw = model.robot, motion.q_xyt[:, 2]
     driven = [wheel.name for wheel in robot.driven_wheels]
     actuated = [actuator.joint().name() for actuator in model.actuators]
     missing = np.full(len(yaw), np.nan)
     columns = {}
     for index, wheel in enumerate(robot.wheels):
-        contact = wheel_contact(robot, wheel, motion)
+        contact = wheel_contact(robot, wheel, stepping)
         place = rotate(-yaw, contact.p_WC[:, :2] - motion.p_WB[:, :2])
         slip = rotate(-yaw, contact.slip_W[:, :2])
         joint = model.drive_joint(wheel).name()

@@ -104,7 +104,7 @@ def run(
         raise SimulationError(f"{scenario.name}: {failure}; nothing was recorded")
     page = None
     if meshcat is not None:
-        draw_path(meshcat, "simulated", recording.q_xyt, SIMULATED_COLOR, lift=0.006 * scenario.robot.body.size[0])
+        draw_path(meshcat, "simulated", recording.q_xyt, SIMULATED_COLOR, lift=0.004 * scenario.robot.body.size[0])
         meshcat.StopRecording()
         meshcat.PublishRecording()
         page = meshcat.StaticHtml() if keep_page else None

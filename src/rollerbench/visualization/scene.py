@@ -11,8 +11,11 @@ from pydrake.systems.framework import DiagramBuilder
 
 from rollerbench.description import Robot
 
+GROUND_SIZE = 40
+"""Side of the ground that is shown, over the size of the robot [-]."""
+
 GROUND_COLOR = np.array([0.88, 0.89, 0.90, 1.0])
-GRID_COLOR = Rgba(0.70, 0.72, 0.75, 1.0)
+GRID_COLOR = Rgba(0.55, 0.60, 0.65, 1.0)
 REFERENCE_COLOR = Rgba(0.10, 0.45, 0.85, 1.0)
 SIMULATED_COLOR = Rgba(0.90, 0.45, 0.05, 1.0)
 
@@ -23,10 +26,14 @@ def local_meshcat() -> Meshcat:
 
 
 def add_ground_visual(plant: MultibodyPlant, robot: Robot) -> None:
-    """Draws the ground, a slab whose top is z = 0, in a plant that is not finalized; Meshcat shows no half space."""
-    side = 60 * _size(robot)
-    slab = Box(side, side, 0.01 * side)
-    pose = RigidTransform([0.0, 0.0, -0.005 * side])
+    """Draws the ground as a slab in a plant that is not finalized; Meshcat shows no half space.
+
+    Its top is a thousandth of the robot's size below z = 0, so that lines on the ground show.
+    """
+    size = _size(robot)
+    side, thickness = GROUND_SIZE * size, 0.05 * size
+    slab = Box(side, side, thickness)
+    pose = RigidTransform([0.0, 0.0, -0.5 * thickness - 0.001 * size])
     plant.RegisterVisualGeometry(plant.world_body(), pose, slab, "ground", GROUND_COLOR)
 
 
@@ -42,15 +49,21 @@ def dress_scene(meshcat: Meshcat, robot: Robot, reference_q_xyt: NDArray[np.floa
     """Sets grid, reference path and camera for a run along a reference path (n, 3)."""
     meshcat.SetProperty("/Grid", "visible", False)
     meshcat.SetProperty("/Axes", "visible", False)
+    # Sunlight: the lamps that come with Meshcat leave a bright spot in the middle of dark ground.
+    meshcat.SetProperty("/Lights/SpotLight", "visible", False)
+    meshcat.SetProperty("/Lights/DirectionalLight", "visible", True)
+    meshcat.SetProperty("/Lights/DirectionalLight/<object>", "intensity", 1.6)
+    meshcat.SetProperty("/Lights/DirectionalLight/<object>", "position", [-2.0, -3.0, 6.0])
+    meshcat.SetProperty("/Lights/AmbientLight/<object>", "intensity", 1.1)
     meshcat.SetProperty("/Background", "top_color", [0.93, 0.95, 0.98])
     meshcat.SetProperty("/Background", "bottom_color", [0.80, 0.84, 0.90])
     size = _size(robot)
     _draw_grid(meshcat, size)
-    draw_path(meshcat, "reference", reference_q_xyt, REFERENCE_COLOR, lift=0.004 * size)
+    draw_path(meshcat, "reference", reference_q_xyt, REFERENCE_COLOR, lift=0.002 * size)
     low, high = reference_q_xyt[:, :2].min(axis=0) - size, reference_q_xyt[:, :2].max(axis=0) + size
     center, span = 0.5 * (low + high), float(np.max(high - low))
     target = np.array([*center, -0.5 * robot.ground_height])
-    meshcat.SetCameraPose(target + span * np.array([-0.55, -0.75, 0.6]), target)
+    meshcat.SetCameraPose(target + span * np.array([-0.3, -0.5, 0.37]), target)
 
 
 def draw_path(
@@ -63,15 +76,16 @@ def draw_path(
         meshcat.SetLine(f"paths/{name}", line.T, 4.0, color)
 
 
-def _draw_grid(meshcat: Meshcat, size: float, lines: int = 60) -> None:
-    """Draws grid lines a power of ten of metres apart, close to the robot's size."""
-    pitch = 10.0 ** round(math.log10(size))
-    reach = 0.5 * lines * pitch
-    offsets = np.linspace(-reach, reach, lines + 1)
-    height = np.full_like(offsets, 0.002 * size)
-    edge = np.full_like(offsets, reach)
-    starts = np.column_stack([np.stack([offsets, -edge, height]), np.stack([-edge, offsets, height])])
-    ends = np.column_stack([np.stack([offsets, edge, height]), np.stack([edge, offsets, height])])
+def _draw_grid(meshcat: Meshcat, size: float) -> None:
+    """Draws grid lines over the slab, a power of ten of metres apart, smaller than the robot."""
+    pitch = 10.0 ** math.floor(math.log10(size))
+    count = 10 * math.ceil(0.025 * GROUND_SIZE * size / pitch)
+    # In pieces of ten cells: with software rendering, a line that ends behind the camera vanishes.
+    offset, start = np.meshgrid(np.arange(-count, count + 1), np.arange(-count, count, 10), indexing="ij")
+    offset, start, end = pitch * offset.ravel(), pitch * start.ravel(), pitch * (start.ravel() + 10)
+    height = np.full_like(offset, 0.001 * size)
+    starts = np.column_stack([np.stack([offset, start, height]), np.stack([start, offset, height])])
+    ends = np.column_stack([np.stack([offset, end, height]), np.stack([end, offset, height])])
     meshcat.SetLineSegments("grid", starts, ends, 1.0, GRID_COLOR)
 
 
