@@ -93,7 +93,7 @@ class Robot(Part):
     @property
     def mass(self) -> float:
         """Mass of the whole robot [kg]."""
-        return self.inertia.mass
+        return self.body.mass + sum(wheel.mass for wheel in self.wheels)
 
     @model_validator(mode="after")
     def _wheels_carry_the_body(self) -> Self:

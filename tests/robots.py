@@ -1,0 +1,95 @@
+"""Robots for tests, as the content of a robot.yaml."""
+
+from typing import Any
+
+Data = dict[str, Any]
+
+TYRE: Data = {"type": "fixed", "radius": 0.1, "width": 0.04, "mass": 1.0}
+OMNI: Data = {
+    "type": "omni",
+    "radius": 0.06,
+    "width": 0.05,
+    "mass": 0.6,
+    "rollers": {"count": 16, "radius": 0.008, "rows": 2},
+}
+MECANUM: Data = {
+    "type": "mecanum",
+    "radius": 0.05,
+    "width": 0.05,
+    "mass": 0.8,
+    "roller_angle_deg": 45.0,
+    "rollers": {"count": 12, "radius": 0.007},
+}
+BODY: Data = {"size": [0.4, 0.2, 0.08], "mass": 10.0, "center_of_mass": [0.0, 0.0, 0.03]}
+
+
+def mecanum(half_base: float = 0.2, half_track: float = 0.2, count: int = 12, radius: float = 0.007) -> Data:
+    """Four Mecanum wheels in the standard layout."""
+    wheels = []
+    for name, x, y, angle in (("fl", 1, 1, 45), ("fr", 1, -1, -45), ("rl", -1, 1, -45), ("rr", -1, -1, 45)):
+        rollers = {"count": count, "radius": radius}
+        place = [x * half_base, y * half_track]
+        wheels.append({**MECANUM, "name": name, "position": place, "roller_angle_deg": angle, "rollers": rollers})
+    return {"name": "test_mecanum", "body": BODY, "wheels": wheels}
+
+
+def cart() -> Data:
+    """Two driven tyres and a castor behind."""
+    castor = {**TYRE, "type": "castor", "radius": 0.04, "width": 0.02, "mass": 0.3, "trail": 0.03}
+    return {
+        "name": "test_cart",
+        "body": {**BODY, "center_of_mass": [-0.05, 0.0, 0.03]},
+        "wheels": [
+            {**TYRE, "name": "left", "position": [0.0, 0.2]},
+            {**TYRE, "name": "right", "position": [0.0, -0.2]},
+            {**castor, "name": "castor", "position": [-0.2, 0.0, -0.06]},
+        ],
+    }
+
+
+def kiwi(distance: float = 0.2) -> Data:
+    """Three omni wheels 120 deg apart, axles through the centre."""
+    places = {"front": (1.0, 0.0, 90.0), "left": (-0.5, 0.75**0.5, 210.0), "right": (-0.5, -(0.75**0.5), 330.0)}
+    return {
+        "name": "test_kiwi",
+        "body": {**BODY, "size": [0.2, 0.2, 0.08]},
+        "wheels": [
+            {**OMNI, "name": name, "position": [distance * x, distance * y], "heading_deg": heading}
+            for name, (x, y, heading) in places.items()
+        ],
+    }
+
+
+def swerve(half_base: float = 0.25, half_track: float = 0.2) -> Data:
+    """Four driven, steered tyres."""
+    corners = {"fl": (1, 1), "fr": (1, -1), "rl": (-1, 1), "rr": (-1, -1)}
+    return {
+        "name": "test_swerve",
+        "body": BODY,
+        "wheels": [
+            {**TYRE, "type": "steered", "name": name, "position": [x * half_base, y * half_track]}
+            for name, (x, y) in corners.items()
+        ],
+    }
+
+
+def mixed() -> Data:
+    """One wheel of every type, at unequal poses."""
+    return {
+        "name": "test_mixed",
+        "body": {**BODY, "size": [0.5, 0.3, 0.08], "center_of_mass": [0.02, -0.01, 0.04], "inertia": [0.1, 0.3, 0.35]},
+        "wheels": [
+            {**MECANUM, "name": "m", "position": [0.4, 0.3, -0.05], "heading_deg": 10.0},
+            {**OMNI, "name": "o", "position": [0.4, -0.3, -0.04], "heading_deg": 80.0, "driven": False},
+            {**TYRE, "name": "f", "position": [-0.1, 0.3]},
+            {**TYRE, "type": "steered", "name": "s", "position": [-0.3, -0.3], "heading_deg": 20.0},
+            {
+                **TYRE,
+                **{"type": "castor", "name": "c", "position": [-0.5, 0.1, -0.05]},
+                **{"radius": 0.05, "width": 0.02, "trail": 0.03},
+            },
+        ],
+    }
+
+
+ALL = {"mecanum": mecanum, "cart": cart, "kiwi": kiwi, "swerve": swerve, "mixed": mixed}
