@@ -17,18 +17,17 @@ Array = NDArray[np.float64]
 
 
 def recording_of(station: Station, scenario: Scenario, context: Context, metadata: dict[str, str]) -> Recording:
-    """Everything recorded since time 0, up to the first sample that is not finite."""
+    """Everything recorded, up to the first sample that is not finite."""
     parts = station.parts
     logs = {name: sink.FindLog(context) for name, sink in parts.logs.items()}
     time = logs["state"].sample_times()
     data = {name: log.data().T for name, log in logs.items()}
-    # The samples before time 0 show how the robot settles. A failure may have left the logs of unequal length.
+    # A failure may have left the logs of unequal length.
     count = min(len(rows) for rows in data.values())
     finite = np.all([np.isfinite(rows[:count]).all(axis=1) for rows in data.values()], axis=0)
     end = count if finite.all() else int(np.argmin(finite))
-    kept = np.flatnonzero(time[:end] > -0.5 * scenario.plant.time_step)
-    time = np.round(time[kept] / scenario.plant.time_step) * scenario.plant.time_step
-    data = {name: rows[kept] for name, rows in data.items()}
+    time = time[:end]
+    data = {name: rows[:end] for name, rows in data.items()}
 
     motion = robot_motion(parts.model, data["state"])
     reference = scenario.twist_profile

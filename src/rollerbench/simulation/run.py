@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from pydrake.geometry import Meshcat
+from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator
 from pydrake.systems.framework import Context
 
@@ -25,7 +26,7 @@ from rollerbench.simulation.watch import fault
 from rollerbench.visualization.scene import SIMULATED_COLOR, draw_path, dress_scene, local_meshcat
 
 SETTLE_TIME = 0.25
-"""Time that the robot stands still before a run, so that it starts at rest on its wheels [s]."""
+"""Time that the robot stands still, in a simulation of its own, to find how it rests on its wheels [s]."""
 
 CHUNK = 0.05
 """Simulated time between two looks at the robot [s]."""
@@ -86,7 +87,7 @@ def run(
     simulator = Simulator(station)
     ApplySimulatorConfig(simulator_config(scenario), simulator)
     context = simulator.get_mutable_context()
-    _settle(simulator, station, context)
+    _stand_at_rest(simulator, station, scenario)
 
     if meshcat is not None:
         times = np.arange(0.0, scenario.duration, scenario.plant.time_step)
@@ -117,14 +118,30 @@ def run(
     return result
 
 
-def _settle(simulator: Simulator, station: Station, context: Context) -> None:
-    """Lets the robot come to rest on its wheels, from time -SETTLE_TIME to 0."""
-    parts = station.parts
-    parts.model.set_pose(parts.model.plant.GetMyMutableContextFromRoot(context), (0.0, 0.0, 0.0))
-    context.SetTime(-SETTLE_TIME)
+def _stand_at_rest(simulator: Simulator, station: Station, scenario: Scenario) -> None:
+    """Starts the robot at the origin, at rest, its weight on its wheels as a moment of standing still leaves it."""
+    trial = Station(scenario, command="external")
+    waiting = Simulator(trial)
+    trial.GetInputPort("v_xyw_B").FixValue(waiting.get_mutable_context(), np.zeros(3))
+    model, plant_context = trial.parts.model, _plant_context(trial, waiting)
+    model.set_pose(plant_context, (0.0, 0.0, 0.0))
+    waiting.AdvanceTo(SETTLE_TIME)
+    what = fault(model, plant_context)
+    if what is not None:
+        raise SimulationError(f"{scenario.name}: before it was to move {what}")
+    positions = model.plant.GetPositions(plant_context)
+    pose = model.plant.EvalBodyPoseInWorld(plant_context, model.body)
+
+    model, plant_context = station.parts.model, _plant_context(station, simulator)
+    model.plant.SetPositions(plant_context, positions)
+    roll, pitch, _ = RollPitchYaw(pose.rotation()).vector()
+    upright = RigidTransform(RollPitchYaw(roll, pitch, 0.0), [0.0, 0.0, pose.translation()[2]])
+    model.plant.SetFreeBodyPose(plant_context, model.body, upright)
     simulator.Initialize()
-    simulator.AdvanceTo(0.0)
-    parts.odometry.set_pose(parts.odometry.GetMyMutableContextFromRoot(context), (0.0, 0.0, 0.0))
+
+
+def _plant_context(station: Station, simulator: Simulator) -> Context:
+    return station.parts.model.plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
 
 
 def _advance(simulator: Simulator, station: Station, scenario: Scenario, progress: Progress | None) -> str | None:
