@@ -1,6 +1,6 @@
 """Scenarios, the diagram that simulates them, and runs."""
 
-from rollerbench.simulation.run import RunResult, run
+from rollerbench.simulation.runner import RunResult, run
 from rollerbench.simulation.scenario import Scenario, load_scenario
 from rollerbench.simulation.station import Station, build_station
 

@@ -1,5 +1,6 @@
 """Runs a scenario: simulate, record, compare with the equations, write the run folder."""
 
+import math
 import time
 import warnings
 from collections.abc import Callable, Mapping
@@ -149,11 +150,11 @@ def _advance(simulator: Simulator, station: Station, scenario: Scenario, progres
     context, model = simulator.get_context(), station.parts.model
     plant_context = model.plant.GetMyContextFromRoot(context)
     step, duration = scenario.plant.time_step, scenario.duration
-    chunk = max(1, round(CHUNK / step)) * step
-    now = 0.0
+    # Times are multiples of the step, as Drake counts them, so that the last sample is part of the log.
+    steps, chunk = math.floor(duration / step + 1e-6), max(1, round(CHUNK / step))
     try:
-        while now < duration:
-            now = min(duration, now + chunk)
+        for count in [*range(chunk, steps, chunk), steps]:
+            now = count * step
             simulator.AdvanceTo(now)
             what = fault(model, plant_context)
             if what is not None:
