@@ -62,9 +62,7 @@ def run(
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Run folder to write.", show_default="runs/NAME")
     ] = None,
-    robot: Annotated[
-        str | None, typer.Option(help="Another robot: a name, or a path to a robot.yaml.")
-    ] = None,
+    robot: Annotated[str | None, typer.Option(help="Another robot: a name, or a path to a robot.yaml.")] = None,
     set_: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="KEY=VALUE", help="Override a field, such as plant.time_step=0.002."),
@@ -136,9 +134,11 @@ def schema(
     """Print the JSON Schema of robot.yaml, for editors."""
     import json
 
+    from pydantic import BaseModel
+
     from rollerbench.description import Robot
 
-    model: type = Robot
+    model: type[BaseModel] = Robot
     if scenario:
         from rollerbench.simulation import Scenario
 
@@ -174,7 +174,9 @@ def _progress(label: str, total: float) -> Iterator[Callable[[float], None]]:
 
     columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed:.2f}/{task.total:g} s"))
     console = Console(stderr=True)
-    with Progress(*columns, TimeRemainingColumn(), console=console, transient=True, disable=not console.is_terminal) as bar:
+    with Progress(
+        *columns, TimeRemainingColumn(), console=console, transient=True, disable=not console.is_terminal
+    ) as bar:
         task = bar.add_task(label, total=total)
         yield lambda now: bar.update(task, completed=now)
 

@@ -3,7 +3,6 @@
 Every message says where the fault lies (file, field), what was found and what is accepted.
 """
 
-
 from typing import Any
 
 

@@ -18,8 +18,8 @@ Array = NDArray[np.float64]
 
 ROBOT_COLUMNS: dict[str, str] = {
     "time": "s",
-    **{name: "m" for name in ("x", "y", "z")},
-    **{name: "rad" for name in ("roll", "pitch", "yaw")},
+    **dict.fromkeys(("x", "y", "z"), "m"),
+    **dict.fromkeys(("roll", "pitch", "yaw"), "rad"),
     **{"vx": "m/s", "vy": "m/s", "wz": "rad/s"},
     **{f"reference_{name}": unit for name, unit in (("x", "m"), ("y", "m"), ("yaw", "rad"))},
     **{f"reference_{name}": unit for name, unit in (("vx", "m/s"), ("vy", "m/s"), ("wz", "rad/s"))},

@@ -61,6 +61,5 @@ def _find(name_or_path: str | Path, kind: str, shipped: dict[str, Path]) -> Path
     close = difflib.get_close_matches(text, shipped, n=3)
     hint = f"did you mean {' or '.join(close)}? " if close else ""
     raise ResourceError(
-        f"no {kind} '{text}': {hint}accepted: a path to a {kind}.yaml, "
-        f"or one of those listed by `rollerbench {kind}s`"
+        f"no {kind} '{text}': {hint}accepted: a path to a {kind}.yaml, or one of those listed by `rollerbench {kind}s`"
     )

@@ -5,10 +5,10 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-import robots
 from pydantic import ValidationError
 from ruamel.yaml import YAML
 
+import robots
 import rollerbench as rb
 
 Data = dict[str, Any]

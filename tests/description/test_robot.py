@@ -5,12 +5,12 @@ import math
 
 import numpy as np
 import pytest
-import robots
 from hypothesis import given
 from hypothesis import strategies as st
 from ruamel.yaml import YAML
 from scipy.integrate import quad
 
+import robots
 import rollerbench as rb
 from rollerbench.description.files import to_yaml
 from rollerbench.description.inertia import barrel_volume, solid_barrel
@@ -43,9 +43,7 @@ def test_published_dimensions() -> None:
         assert [abs(x) for x in wheel.position] == [0.235, 0.15]
 
 
-@given(
-    st.floats(0.02, 0.5), st.floats(0.05, 0.4), st.floats(30, 90), st.integers(6, 32), st.sampled_from([1, 2])
-)
+@given(st.floats(0.02, 0.5), st.floats(0.05, 0.4), st.floats(30, 90), st.integers(6, 32), st.sampled_from([1, 2]))
 def test_rollers_touch_the_ground_at_the_bottom_and_where_they_hand_over(
     radius: float, share: float, angle_deg: float, count: int, rows: int
 ) -> None:

@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-import robots
 from hypothesis import given
 from hypothesis import strategies as st
 from wpimath.geometry import Translation2d
@@ -15,6 +14,7 @@ from wpimath.kinematics import (
     SwerveDrive4Kinematics,
 )
 
+import robots
 import rollerbench as rb
 from rollerbench.kinematics import finite_roller_factor
 
@@ -151,7 +151,7 @@ def test_functions_broadcast() -> None:
 
 def test_a_skidding_tyre_is_named() -> None:
     kinematics = rb.WheelKinematics(robots.cart())
-    with pytest.raises(rb.InfeasibleTwist, match="left at \\+0.3 m/s, right at \\+0.3 m/s") as caught:
+    with pytest.raises(rb.InfeasibleTwist, match=r"left at \+0.3 m/s, right at \+0.3 m/s") as caught:
         kinematics.inverse([[1.0, 0.0, 0.0], [0.5, 0.3, 0.2]])
     assert caught.value.wheel_names == ("left", "right")
     assert kinematics.inverse([0.5, 0.3, 0.2], strict=False) == pytest.approx(kinematics.inverse([0.5, 0, 0.2]))

@@ -4,13 +4,13 @@ import logging
 
 import numpy as np
 import pytest
-import robots
 from lxml import etree
 from pydrake.geometry import Role, SceneGraph
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
 from pydrake.systems.framework import DiagramBuilder
 
+import robots
 import rollerbench as rb
 from rollerbench.resources import models_dir, robot_names
 
@@ -111,5 +111,5 @@ def test_visuals_show_the_rotation() -> None:
     rollers = root.xpath("//link[starts-with(@name, 'front_left_roller')]")
     assert "spoke" in hub
     assert len(rollers) == 12
-    colors = {tuple(roller.xpath("visual/material/diffuse/text()"))[0] for roller in rollers}
+    colors = {roller.findtext("visual/material/diffuse") for roller in rollers}
     assert len(colors) == 2

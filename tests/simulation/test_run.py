@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-import robots
 from ruamel.yaml import YAML
 
+import robots
 import rollerbench as rb
 
 TURNING = {
@@ -114,7 +114,7 @@ def test_the_recording_reads_back_without_drake(folder: Path) -> None:
 
 
 def test_slip_and_contacts_are_those_of_drake() -> None:
-    """Contact points within 20 micrometres, slip within 10 micrometres a second of Drake's contact results."""
+    """Contact points within the penetration, slip within 10 micrometres a second of Drake's contact results."""
     from pydrake.systems.analysis import Simulator
 
     from rollerbench.kinematics.contact import wheel_contact
@@ -145,8 +145,8 @@ def test_slip_and_contacts_are_those_of_drake() -> None:
         for wheel in scenario.robot.wheels:
             contact = wheel_contact(scenario.robot, wheel, motion)
             info = found[f"{wheel.name}_roller_{contact.roller[0]:02d}"]
-            # 20 um: Drake moves its point by half of the depth, not quite along the vertical.
-            assert contact.p_WC[0] == pytest.approx(info.contact_point(), abs=2e-5)
+            # Drake moves its point by half of the depth, not quite along the vertical.
+            assert contact.p_WC[0] == pytest.approx(info.contact_point(), abs=contact.depth[0])
             assert contact.depth[0] == pytest.approx(info.point_pair().depth, abs=1e-9)
             assert np.linalg.norm(contact.slip_W[0][:2]) == pytest.approx(info.slip_speed(), abs=1e-5)
             compared += 1
@@ -216,7 +216,7 @@ def test_a_robot_that_tips_over_fails_and_keeps_what_was_computed(tmp_path: Path
     }
     with (
         pytest.warns(rb.RollerbenchWarning, match="fine: up to"),
-        pytest.raises(rb.SimulationError, match="tipped over|left the ground") as caught,
+        pytest.raises(rb.SimulationError, match=r"tipped over|left the ground") as caught,
     ):
         rb.run(scenario, output=tmp_path / "run")
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())
@@ -232,13 +232,14 @@ def test_a_state_that_is_not_finite_fails(monkeypatch: pytest.MonkeyPatch) -> No
     from pydrake.systems.analysis import Simulator
 
     class Poisoned(Simulator):
-        def AdvanceTo(self, time: float) -> None:  # noqa: N802  # Drake's name
+        def AdvanceTo(self, time: float) -> None:  # Drake's name
             super().AdvanceTo(time)
             if time > 0.5:
                 station = self.get_system()
                 plant = station.parts.model.plant
                 context = plant.GetMyMutableContextFromRoot(self.get_mutable_context())
-                plant.SetVelocities(context, np.full(plant.num_velocities(), np.nan))
+                state = context.get_mutable_discrete_state_vector()
+                state.SetFromVector(np.full(state.size(), np.nan))
 
     monkeypatch.setattr("rollerbench.simulation.runner.Simulator", Poisoned)
     with pytest.raises(rb.SimulationError, match="not finite") as caught:
@@ -253,7 +254,7 @@ def test_an_interrupt_keeps_what_was_computed(tmp_path: Path) -> None:
         if now > 0.4:
             raise KeyboardInterrupt
 
-    with pytest.raises(rb.SimulationError, match="interrupted at t = 0.45"):
+    with pytest.raises(rb.SimulationError, match=r"interrupted at t = 0.45"):
         rb.run(TURNING, output=tmp_path / "run", progress=stop)
     assert rb.Recording.read(tmp_path / "run").time[-1] == pytest.approx(0.45)
 

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-import robots
 from ruamel.yaml import YAML
 
+import robots
 import rollerbench as rb
 from rollerbench.resources import scenario_files
 from rollerbench.simulation.drake_config import plant_config, simulator_config
@@ -128,5 +128,5 @@ def test_the_step_rule() -> None:
 
 def test_an_infeasible_command_is_refused_with_the_tyre() -> None:
     scenario = {**BASE, "robot": robots.cart(), "command": {"type": "twist", "v_xyw_B": [0.1, 0.1, 0.0]}}
-    with pytest.raises(rb.InfeasibleTwist, match="left at .* right at"):
+    with pytest.raises(rb.InfeasibleTwist, match=r"left at .* right at"):
         rb.run(scenario, save=False)

@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-import robots
 from pydrake.autodiffutils import ExtractGradient, InitializeAutoDiff
 from pydrake.symbolic import Evaluate, MakeVectorVariable
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput
 
+import robots
 import rollerbench as rb
 from rollerbench.systems import PlanarState
 

@@ -126,7 +126,7 @@ def _plain_value(value: Any) -> Any:
 
 
 def _plain(value: Any) -> Any:
-    """ruamel's containers and scalars as Python's own, so that messages show plain values."""
+    """Ruamel's containers and scalars as Python's own, so that messages show plain values."""
     if isinstance(value, Mapping):
         return {str(key): _plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):

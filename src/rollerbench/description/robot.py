@@ -83,9 +83,7 @@ class Robot(Part):
                 parts.append(fork_inertia(wheel).moved(rotation, wheel.p_BoHo_B))
             if isinstance(wheel, RollerWheel):
                 parts += [
-                    roller_inertia(wheel).moved(
-                        rotation @ roller_rotation, wheel.center_B + rotation @ center
-                    )
+                    roller_inertia(wheel).moved(rotation @ roller_rotation, wheel.center_B + rotation @ center)
                     for roller_rotation, center in roller_poses_H(wheel)
                 ]
         return combined(parts)
@@ -128,7 +126,9 @@ def _support_problems(robot: Robot) -> Iterator[Problem]:
             yield Problem(("wheels", index, "position"), message, wheel.position)
     bottom = robot.body.box_center[2] - 0.5 * robot.body.size[2]
     if bottom <= ground:
-        message = f"the body reaches {ground - bottom:.4g} m into the ground; accepted: a bottom above z = {ground:.4g} m"
+        message = (
+            f"the body reaches {ground - bottom:.4g} m into the ground; accepted: a bottom above z = {ground:.4g} m"
+        )
         yield Problem(("body", "size"), message, robot.body.size)
     com = robot.inertia.com[:2]
     margin = support_margin(robot.contact_points_B[:, :2], com)

@@ -61,7 +61,7 @@ class RollerRing:
     @property
     def angles(self) -> NDArray[np.float64]:
         """Wheel angles (count,) of the rollers about +y from the bottom [rad]."""
-        return self.pitch * np.arange(self.count)
+        return self.pitch * np.arange(self.count, dtype=np.float64)
 
     @property
     def axes_H(self) -> NDArray[np.float64]:

@@ -100,8 +100,8 @@ class Wheel(Part):
     def roller_slope(self) -> float:
         """tan(g) of the angle g from the rolling direction to the ground-contact roller's axis [-].
 
-        The axle is a quarter turn left of the rolling direction, so tan(g) = -cot(roller_angle): 0 for an omni wheel, -1
-        for a Mecanum wheel with roller_angle_deg: 45. A tyre counts as 0.
+        The axle is a quarter turn left of the rolling direction, so tan(g) = -cot(roller_angle): 0 for an omni
+        wheel, -1 for a Mecanum wheel with roller_angle_deg: 45. A tyre counts as 0.
         """
         return 0.0
 
@@ -247,6 +247,4 @@ class MecanumWheel(RollerWheel):
     type: Literal["mecanum"] = "mecanum"
 
 
-AnyWheel = Annotated[
-    FixedWheel | SteeredWheel | CastorWheel | OmniWheel | MecanumWheel, Field(discriminator="type")
-]
+AnyWheel = Annotated[FixedWheel | SteeredWheel | CastorWheel | OmniWheel | MecanumWheel, Field(discriminator="type")]

@@ -35,9 +35,7 @@ def null_space(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
     return vt[rank:].T
 
 
-def degree_of_mobility(
-    fixed_rows: NDArray[np.float64], steered_positions: NDArray[np.float64]
-) -> Mobility:
+def degree_of_mobility(fixed_rows: NDArray[np.float64], steered_positions: NDArray[np.float64]) -> Mobility:
     """Degrees of a base from its tyres.
 
     The steered wheels must agree on a common centre of rotation, so they are turned to a generic twist that the fixed

@@ -36,13 +36,13 @@ class WheelKinematics:
     """What the wheels of a robot do when its body moves, and the other way round.
 
     Twists are v_xyw_B = [vx, vy, wz] of the reference point in B (m/s, m/s, rad/s; left and counter-clockwise
-    positive). Wheel speeds [rad/s] are those of the driven wheels in the order of robot.yaml; positive drives towards +x
-    of the wheel's heading. All functions broadcast over leading axes.
+    positive). Wheel speeds [rad/s] are those of the driven wheels in the order of robot.yaml; positive drives towards
+    +x of the wheel's heading. All functions broadcast over leading axes.
 
     Attributes:
         robot: The robot.
         p_BoCo_B: Reference point (2,) from Bo, in B [m].
-        swivel_angles: Angle (n_wheels,) of every wheel about +z from its heading_deg [rad]; 0 for those that cannot swivel.
+        swivel_angles: Angle (n_wheels,) of every wheel about +z from its heading_deg [rad]; 0 if it cannot swivel.
         rollers: "textbook", or "finite" for the mean over a roller pitch (see `finite_roller_slope`).
     """
 
@@ -141,7 +141,8 @@ class WheelKinematics:
                 f"{self.robot.name}: its driven wheels and tyres leave a motion of the body open, so wheel speeds do "
                 "not determine the twist; accepted: robots with enough driven wheels (driven: true) or fixed tyres"
             )
-        return np.linalg.pinv(stacked)[:, : len(self.drive_matrix)]
+        inverse = np.asarray(np.linalg.pinv(stacked), dtype=np.float64)
+        return inverse[:, : len(self.drive_matrix)]
 
     def residual(self, wheel_speeds: ArrayLike) -> Array:
         """Part (..., n_driven) of the wheel speeds that no body motion explains [rad/s]: slip, or a wrong radius."""
@@ -194,8 +195,8 @@ class WheelKinematics:
 
         Args:
             v_xyw_B: Twists (..., 3).
-            previous: Angles (..., n_steered) that the wheels have [rad]. If given, a wheel turns by a quarter turn at the
-                most and drives backwards where that is shorter, and a wheel that need not move keeps its angle.
+            previous: Angles (..., n_steered) that the wheels have [rad]. If given, a wheel turns by a quarter turn at
+                the most and drives backwards where that is shorter, and a wheel that need not move keeps its angle.
 
         Returns:
             steering_angles: (..., n_steered) from heading_deg [rad]; without previous in [-pi, pi], 0 at rest.
@@ -343,7 +344,7 @@ def finite_roller_slope(wheel: AnyWheel) -> float:
         R q' = vx - vy cot(gamma) sec(theta) - w (R - r) cot(gamma) tan(theta).
 
     At constant q' and w = 0, vy is proportional to cos(theta), whose mean over the pitch is sin(pi/N)/(pi/N): the wheel
-    acts like one with tan(gamma_eff) = tan(gamma) sin(pi/N)/(pi/N). Omni wheels (gamma = 90 deg) and tyres are unchanged.
+    acts like one with tan(gamma_eff) = tan(gamma) sin(pi/N)/(pi/N). Omni wheels (gamma = 90 deg) and tyres stay.
     """
     if not isinstance(wheel, RollerWheel):
         return 0.0

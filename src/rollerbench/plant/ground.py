@@ -26,17 +26,13 @@ def add_ground(plant: MultibodyPlant, *, friction: float = 0.8, slope_deg: float
     if not plant.geometry_source_is_registered():
         raise SimulationError("add_ground: the plant has no scene graph; accepted: AddMultibodyPlantSceneGraph")
     properties = ProximityProperties()
-    AddContactMaterial(
-        point_stiffness=RIGID, friction=CoulombFriction(friction, friction), properties=properties
-    )
+    AddContactMaterial(point_stiffness=RIGID, friction=CoulombFriction(friction, friction), properties=properties)
     logging.getLogger("drake").addFilter(_not_about_deformables)
     plant.RegisterCollisionGeometry(plant.world_body(), RigidTransform(), HalfSpace(), "ground", properties)
     if slope_deg:
         slope = math.radians(slope_deg)
         strength = plant.gravity_field().gravity_vector()[2]
-        plant.mutable_gravity_field().set_gravity_vector(
-            [strength * math.sin(slope), 0.0, strength * math.cos(slope)]
-        )
+        plant.mutable_gravity_field().set_gravity_vector([strength * math.sin(slope), 0.0, strength * math.cos(slope)])
 
 
 def _not_about_deformables(record: logging.LogRecord) -> bool:

@@ -62,8 +62,7 @@ class RobotModel:
     def actuators(self) -> list[JointActuator]:
         """Actuators in the order of the plant's actuation and desired state ports."""
         return [
-            self.plant.get_joint_actuator(index)
-            for index in self.plant.GetJointActuatorIndices(self.model_instance)
+            self.plant.get_joint_actuator(index) for index in self.plant.GetJointActuatorIndices(self.model_instance)
         ]
 
     def desired_state_matrix(self) -> NDArray[np.float64]:

@@ -24,9 +24,7 @@ def run_page(summary: Mapping[str, Any], figures: Mapping[str, str], *, has_reco
         figures: SVG texts by name.
         has_recording: Whether recording.html lies beside the page.
     """
-    environment = Environment(
-        loader=PackageLoader("rollerbench.report"), autoescape=True, undefined=StrictUndefined
-    )
+    environment = Environment(loader=PackageLoader("rollerbench.report"), autoescape=True, undefined=StrictUndefined)
     drawn = [(TITLES[name], Markup(svg[svg.index("<svg") :])) for name, svg in figures.items()]
     return environment.get_template("run.html.j2").render(
         summary=summary, rows=summary_rows(summary), figures=drawn, has_recording=has_recording

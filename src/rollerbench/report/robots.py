@@ -38,7 +38,11 @@ def robot_details(robot: Robot) -> list[Table]:
     tables = [_measures(robot, kinematics), _limits(robot)]
     for title, names, matrix in (
         ("Drive matrix J: wheel speeds [rad/s] = J v_xyw_B", driven, kinematics.drive_matrix),
-        ("Constraint matrix C: sideways speeds of the tyres [m/s] = C v_xyw_B = 0", tyres, kinematics.constraint_matrix),
+        (
+            "Constraint matrix C: sideways speeds of the tyres [m/s] = C v_xyw_B = 0",
+            tyres,
+            kinematics.constraint_matrix,
+        ),
         ("Roller matrix G: roller surface speeds [m/s] = G v_xyw_B", rollers, kinematics.roller_matrix),
     ):
         if len(matrix):

@@ -84,9 +84,7 @@ def _add_wheel(model: etree._Element, robot: Robot, wheel: AnyWheel) -> None:
     _add_inertial(hub, hub_inertia(wheel))
     _add_hub_visuals(hub, wheel)
     effort = (wheel.max_effort or -1.0) if wheel.driven else 0.0
-    _add_joint(
-        model, names.drive_joint(wheel.name), carrier, hub.get("name"), "0 1 0", effort, speed=wheel.max_speed
-    )
+    _add_joint(model, names.drive_joint(wheel.name), carrier, hub.get("name"), "0 1 0", effort, speed=wheel.max_speed)
     if isinstance(wheel, RollerWheel):
         _add_rollers(model, robot, wheel)
     else:
@@ -104,9 +102,7 @@ def _add_fork(model: etree._Element, wheel: AnyWheel, heading: Rotation) -> None
     _add_shape(link, "visual", "column", column, position=np.array([0, 0, 1.2 * wheel.radius]), color=HUB_COLOR)
     effort = (getattr(wheel, "max_steering_effort", None) or -1.0) if wheel.steered else 0.0
     speed = getattr(wheel, "max_steering_speed", None)
-    _add_joint(
-        model, names.swivel_joint(wheel.name), names.BODY, link.get("name"), "0 0 1", effort, speed=speed
-    )
+    _add_joint(model, names.swivel_joint(wheel.name), names.BODY, link.get("name"), "0 0 1", effort, speed=speed)
 
 
 def _add_hub_visuals(hub: etree._Element, wheel: AnyWheel) -> None:

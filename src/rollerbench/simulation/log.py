@@ -40,9 +40,7 @@ def recording_of(station: Station, scenario: Scenario, context: Context, metadat
     columns |= _named(("reference_vx", "reference_vy", "reference_wz"), reference(time))
     columns |= _named(("odometry_x", "odometry_y", "odometry_yaw"), data["odometry_q_xyt"])
     stepping = robot_motion(parts.model, _with_next_velocities(parts.model, data["state"]))
-    columns |= _wheel_columns(
-        parts.model, motion, stepping, data["wheel_speed_command"], data["net_actuation"]
-    )
+    columns |= _wheel_columns(parts.model, motion, stepping, data["wheel_speed_command"], data["net_actuation"])
     return Recording(columns=columns, wheel_names=scenario.robot.wheel_names, metadata=metadata)
 
 
@@ -91,7 +89,7 @@ def _wheel_columns(
     driven = [wheel.name for wheel in robot.driven_wheels]
     actuated = [actuator.joint().name() for actuator in model.actuators]
     missing = np.full(len(yaw), np.nan)
-    columns = {}
+    columns: dict[str, Array] = {}
     for index, wheel in enumerate(robot.wheels):
         contact = wheel_contact(robot, wheel, stepping)
         place = rotate(-yaw, contact.p_WC[:, :2] - motion.p_WB[:, :2])

@@ -172,8 +172,9 @@ def _warn_about_step(scenario: Scenario) -> None:
     largest, wheel = scenario.step_rule()
     if scenario.plant.time_step > largest:
         warnings.warn(
-            f"{scenario.name}: at the commanded speeds wheel {wheel} turns by more than a sixth of its roller pitch in a "
-            f"step of plant.time_step = {scenario.plant.time_step:g} s, so the robot may hop; fine: up to {largest:.2g} s",
+            f"{scenario.name}: at the commanded speeds wheel {wheel} turns by more than a sixth of its roller pitch "
+            f"in a step of plant.time_step = {scenario.plant.time_step:g} s, so the robot may hop; "
+            f"fine: up to {largest:.2g} s",
             RollerbenchWarning,
             stacklevel=3,
         )

@@ -157,7 +157,9 @@ class Scenario(Part):
     def _command_fits(self) -> Self:
         problems = []
         if 2 * self.command.ramp > self.duration:
-            message = f"start and stop do not fit into duration = {self.duration}; accepted: up to {self.duration / 2:g}"
+            message = (
+                f"start and stop do not fit into duration = {self.duration}; accepted: up to {self.duration / 2:g}"
+            )
             problems.append(Problem(("command", "ramp"), message, self.command.ramp))
         if self.plant.time_step > self.duration:
             message = f"accepted: at most the duration, {self.duration:g}"
@@ -210,7 +212,7 @@ class Scenario(Part):
         return held_with_ramps(value, self.duration, ramp)
 
     def step_rule(self) -> tuple[float, str | None]:
-        """Largest plant step that follows the rollers' hand-over at the commanded speeds [s], and the wheel that needs it.
+        """Largest plant step that follows the rollers' hand-over at the commanded speeds [s], and whose it is.
 
         A wheel may turn by a sixth of its roller pitch in a step. Infinite if no wheel with rollers is commanded.
         """

@@ -161,9 +161,7 @@ def _add_command(builder: DiagramBuilder, scenario: Scenario, *, external: bool)
     return kinematics.GetOutputPort("wheel_speeds")
 
 
-def _connect_servo(
-    builder: DiagramBuilder, scenario: Scenario, model: RobotModel, command_port: OutputPort
-) -> None:
+def _connect_servo(builder: DiagramBuilder, scenario: Scenario, model: RobotModel, command_port: OutputPort) -> None:
     robot, plant = scenario.robot, model.plant
     if not model.actuators:
         return

@@ -18,9 +18,7 @@ def versions() -> dict[str, str]:
     return {"rollerbench": version("rollerbench"), "drake": version("drake"), "python": platform.python_version()}
 
 
-def summarize(
-    scenario: Scenario, recording: Recording, *, wall_time: float, failure: str | None
-) -> dict[str, Any]:
+def summarize(scenario: Scenario, recording: Recording, *, wall_time: float, failure: str | None) -> dict[str, Any]:
     """Key figures of a run, SI units.
 
     Args:

@@ -13,7 +13,7 @@ TIP_ANGLE = math.radians(45)
 """A robot inclined by more has tipped over [rad]."""
 
 HEIGHT_SHARE = 0.5
-"""A robot whose body rises or sinks by this share of its smallest wheel radius has left the ground or fallen through."""
+"""By which share of the smallest wheel radius the body may rise or sink on level ground [-]."""
 
 
 def fault(model: RobotModel, context: Context) -> str | None:

@@ -49,11 +49,8 @@ def dress_scene(meshcat: Meshcat, robot: Robot, reference_q_xyt: NDArray[np.floa
     """Sets grid, reference path and camera for a run along a reference path (n, 3)."""
     meshcat.SetProperty("/Grid", "visible", False)
     meshcat.SetProperty("/Axes", "visible", False)
-    # Sunlight: the lamps that come with Meshcat leave a bright spot in the middle of dark ground.
+    # Even light: the lamp that comes with Meshcat leaves a bright spot in the middle of dark ground.
     meshcat.SetProperty("/Lights/SpotLight", "visible", False)
-    meshcat.SetProperty("/Lights/DirectionalLight", "visible", True)
-    meshcat.SetProperty("/Lights/DirectionalLight/<object>", "intensity", 1.6)
-    meshcat.SetProperty("/Lights/DirectionalLight/<object>", "position", [-2.0, -3.0, 6.0])
     meshcat.SetProperty("/Lights/AmbientLight/<object>", "intensity", 1.1)
     meshcat.SetProperty("/Background", "top_color", [0.93, 0.95, 0.98])
     meshcat.SetProperty("/Background", "bottom_color", [0.80, 0.84, 0.90])
@@ -79,10 +76,13 @@ def draw_path(
 def _draw_grid(meshcat: Meshcat, size: float) -> None:
     """Draws grid lines over the slab, a power of ten of metres apart, smaller than the robot."""
     pitch = 10.0 ** math.floor(math.log10(size))
-    count = 10 * math.ceil(0.025 * GROUND_SIZE * size / pitch)
-    # In pieces of ten cells: with software rendering, a line that ends behind the camera vanishes.
-    offset, start = np.meshgrid(np.arange(-count, count + 1), np.arange(-count, count, 10), indexing="ij")
-    offset, start, end = pitch * offset.ravel(), pitch * start.ravel(), pitch * (start.ravel() + 10)
+    count = 4 * math.ceil(0.0625 * GROUND_SIZE * size / pitch)
+    # In pieces of four cells: with software rendering, a line that ends behind the camera vanishes.
+    offset, start = (
+        pitch * indices.ravel()
+        for indices in np.meshgrid(np.arange(-count, count + 1), np.arange(-count, count, 4), indexing="ij")
+    )
+    end = start + 4 * pitch
     height = np.full_like(offset, 0.001 * size)
     starts = np.column_stack([np.stack([offset, start, height]), np.stack([start, offset, height])])
     ends = np.column_stack([np.stack([offset, end, height]), np.stack([end, offset, height])])

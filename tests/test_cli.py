@@ -1,0 +1,127 @@
+"""The command as users meet it: a process, its output and its exit status."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from ruamel.yaml import YAML
+
+import robots
+from rollerbench.resources import robot_names, scenario_files
+
+
+def rollerbench(*arguments: str, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    code = "from rollerbench.cli import main; main()"
+    return subprocess.run(
+        [sys.executable, "-c", code, *arguments], capture_output=True, text=True, cwd=cwd, check=False
+    )
+
+
+def test_help_has_an_example_for_every_command() -> None:
+    top = rollerbench("--help")
+    assert top.returncode == 0
+    for command in ("robots", "scenarios", "run", "build", "schema"):
+        assert command in top.stdout
+        shown = rollerbench(command, "--help")
+        assert shown.returncode == 0
+        assert f"Example: rollerbench {command}" in shown.stdout
+
+
+def test_robots_and_scenarios_are_listed() -> None:
+    listed = rollerbench("robots").stdout
+    assert all(name in listed for name in robot_names())
+    listed = rollerbench("scenarios").stdout
+    assert all(name in listed for name in scenario_files())
+
+
+def test_one_robot_is_shown_in_full() -> None:
+    out = rollerbench("robots", "youbot_base").stdout
+    for words in ("Drive matrix J", "[rad/s]", "21.0526", "Roller matrix G", "Degree of mobility", "1.3810", "30"):
+        assert words in out
+
+
+def test_run_prints_a_table_and_writes_the_folder(tmp_path: Path) -> None:
+    done = rollerbench("run", "youbot_plus_y", "-o", "out", "--no-recording", "--set", "duration=1.2", cwd=tmp_path)
+    assert done.returncode == 0
+    assert done.stderr == ""
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert f"{1e3 * summary['pose_error']['final_position']:.3f} mm" in done.stdout
+    assert "Real-time factor" in done.stdout
+    assert not (tmp_path / "out" / "recording.html").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["run", "no_such"], "no scenario 'no_such'"),
+        (["run", "youbot_plus_x", "--robot", "no_such"], "no robot 'no_such'"),
+        (["run", "youbot_plus_x", "--set", "plant.time_step=fast"], "plant.time_step = 'fast'"),
+        (["run", "youbot_plus_x", "--set", "oops"], "--set 'oops'"),
+        (["robots", "no_such"], "no robot 'no_such'"),
+        (["build", "no_such"], "no robot 'no_such'"),
+        (["fly"], "No such command 'fly'"),
+        (["run", "youbot_plus_x", "-o", "/dev/null/run"], "/dev/null/run"),
+    ],
+)
+def test_bad_input_ends_with_one_message_and_status_2(arguments: list[str], words: str, tmp_path: Path) -> None:
+    done = rollerbench(*arguments, cwd=tmp_path)
+    assert done.returncode == 2
+    assert words in done.stderr
+    assert "Traceback" not in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_infeasible_command_is_bad_input(tmp_path: Path) -> None:
+    with (tmp_path / "cart.yaml").open("w") as stream:
+        YAML().dump(robots.cart(), stream)
+    done = rollerbench("run", "youbot_plus_y", "--robot", "cart.yaml", cwd=tmp_path)
+    assert done.returncode == 2
+    assert "left at +0.3 m/s" in done.stderr
+
+
+def test_a_failed_simulation_has_status_3_and_keeps_its_recording(tmp_path: Path) -> None:
+    data = robots.mecanum()
+    data["body"] = {"size": [0.3, 0.2, 1.5], "mass": 10.0, "center_of_mass": [0.0, 0.0, 1.0], "center": [0, 0, 0.8]}
+    with (tmp_path / "tall.yaml").open("w") as stream:
+        YAML().dump(data, stream)
+    overrides = ("--set", "command.v_xyw_B=[2, 0, 0]", "--set", "command.ramp=0.1", "--no-recording")
+    done = rollerbench("run", "youbot_plus_x", "--robot", "tall.yaml", "-o", "out", *overrides, cwd=tmp_path)
+    assert done.returncode == 3
+    assert "warning: " in done.stderr
+    assert "failed: youbot_plus_x: at t = " in done.stderr
+    assert "Traceback" not in done.stderr
+    assert "Failed" in done.stdout
+    assert (tmp_path / "out" / "recording.parquet").is_file()
+    assert json.loads((tmp_path / "out" / "summary.json").read_text())["status"] == "failed"
+
+
+def test_build_writes_the_model_beside_the_description(tmp_path: Path) -> None:
+    with (tmp_path / "robot.yaml").open("w") as stream:
+        YAML().dump(robots.kiwi(), stream)
+    done = rollerbench("build", str(tmp_path / "robot.yaml"))
+    assert done.returncode == 0
+    assert (tmp_path / "test_kiwi.sdf").read_text().startswith("<?xml")
+
+
+def test_the_schema_accepts_what_is_shipped() -> None:
+    schema = json.loads(rollerbench("schema").stdout)
+    assert schema["title"] == "Robot"
+    assert "wheels" in schema["required"]
+    assert "command" in json.loads(rollerbench("schema", "--scenario").stdout)["required"]
+
+
+@pytest.mark.parametrize("what", ["load_robot('youbot_base')", "WheelKinematics('youbot_base').drive_matrix"])
+def test_descriptions_and_kinematics_do_not_load_drake(what: str) -> None:
+    code = f"import sys, rollerbench as rb; rb.{what}; assert 'pydrake' not in sys.modules"
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_help_loads_nothing_heavy() -> None:
+    code = (
+        "import sys, rollerbench.cli\n"
+        "heavy = {'pydrake', 'numpy', 'scipy', 'matplotlib', 'pydantic', 'pyarrow'} & sys.modules.keys()\n"
+        "assert not heavy, heavy"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)

@@ -1,0 +1,60 @@
+"""The pages of a run open offline in a real browser and show what they should."""
+
+import io
+from pathlib import Path
+
+import matplotlib.image
+import numpy as np
+import pytest
+
+import rollerbench as rb
+from browser import opened
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    scenario = rb.load_scenario("youbot_plus_y", overrides={"duration": 1.0, "command.ramp": 0.2})
+    result = rb.run(scenario, output=tmp_path_factory.mktemp("runs") / "run")
+    assert result.folder is not None
+    return result.folder
+
+
+def _pixels(png: bytes) -> np.ndarray:
+    return matplotlib.image.imread(io.BytesIO(png), format="png")[..., :3]
+
+
+def test_the_recording_shows_robot_and_ground_without_a_request(folder: Path) -> None:
+    with opened(folder / "recording.html") as watched:
+        watched.page.wait_for_timeout(2500)
+        start = _pixels(watched.page.screenshot())
+        assert watched.requests == []
+        assert watched.errors == []
+    red, _, blue = np.moveaxis(start, -1, 0)
+    # The robot's body is the only saturated blue; the ground is nearly grey and fills the lower edge.
+    body = (blue > 0.4) & (blue - red > 0.25)
+    assert 0.002 < body.mean() < 0.3
+    ground = start[-200:]
+    assert (np.ptp(ground, axis=-1) < 0.15).mean() > 0.8
+    assert ground.std() > 0.005  # grid lines
+    assert len(np.unique((start * 16).astype(int).reshape(-1, 3), axis=0)) > 20
+
+
+def test_the_recording_moves(folder: Path) -> None:
+    """The animation holds the whole run: its clip is as long, and the robot has a track."""
+    with opened(folder / "recording.html") as watched:
+        watched.page.wait_for_timeout(500)
+        first = _pixels(watched.page.screenshot())
+        watched.page.wait_for_timeout(2000)
+        last = _pixels(watched.page.screenshot())
+    assert np.abs(first - last).max() > 0.2
+
+
+@pytest.mark.parametrize("width", [360, 1000])
+def test_the_report_reads_on_phone_and_desk(folder: Path, width: int) -> None:
+    with opened(folder / "report.html", width=width) as watched:
+        assert watched.requests == []
+        assert watched.errors == []
+        assert watched.page.locator("figure svg").count() == 4
+        assert "Position error" in watched.page.inner_text("body")
+        overflow = watched.page.evaluate("document.documentElement.scrollWidth - window.innerWidth")
+        assert overflow <= 0
