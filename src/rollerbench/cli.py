@@ -1,6 +1,5 @@
 """The command line: thin commands over the Python API."""
 
-import logging
 import sys
 import warnings
 from collections.abc import Callable, Iterator
@@ -79,7 +78,6 @@ def run(
     overrides = list(set_ or [])
     overrides += ["recording.html=false"] if no_recording else []
     overrides += ["simulator.target_realtime_rate=1.0"] if live else []
-    logging.getLogger("drake").setLevel(logging.WARNING)
     loaded = simulation.load_scenario(scenario, overrides=overrides, robot=robot)
     meshcat = None
     if live:

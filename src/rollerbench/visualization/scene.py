@@ -1,5 +1,6 @@
 """The robot's surroundings in Meshcat, and the page that keeps a run."""
 
+import logging
 import math
 
 import numpy as np
@@ -22,7 +23,13 @@ SIMULATED_COLOR = Rgba(0.90, 0.45, 0.05, 1.0)
 
 def local_meshcat() -> Meshcat:
     """A Meshcat server that only this machine can reach."""
-    return Meshcat(MeshcatParams(host="localhost", show_stats_plot=False))
+    logger = logging.getLogger("drake")
+    level = logger.level
+    logger.setLevel(logging.WARNING)  # Every run would announce an address that nobody needs.
+    try:
+        return Meshcat(MeshcatParams(host="localhost", show_stats_plot=False))
+    finally:
+        logger.setLevel(level)
 
 
 def add_ground_visual(plant: MultibodyPlant, robot: Robot) -> None:
