@@ -25,7 +25,8 @@ def _pixels(png: bytes) -> np.ndarray:
 
 def test_the_recording_shows_robot_and_ground_without_a_request(folder: Path) -> None:
     with opened(folder / "recording.html") as watched:
-        watched.page.wait_for_timeout(2500)
+        watched.page.wait_for_function("viewer.animator.duration > 0")
+        watched.page.wait_for_timeout(1000)
         start = _pixels(watched.page.screenshot())
         assert watched.requests == []
         assert watched.errors == []
@@ -40,13 +41,17 @@ def test_the_recording_shows_robot_and_ground_without_a_request(folder: Path) ->
 
 
 def test_the_recording_moves(folder: Path) -> None:
-    """The animation holds the whole run: its clip is as long, and the robot has a track."""
+    """The animation lasts as long as the run, and the robot is elsewhere at its end."""
     with opened(folder / "recording.html") as watched:
-        watched.page.wait_for_timeout(500)
-        first = _pixels(watched.page.screenshot())
-        watched.page.wait_for_timeout(2000)
-        last = _pixels(watched.page.screenshot())
-    assert np.abs(first - last).max() > 0.2
+        page = watched.page
+        page.wait_for_function("viewer.animator.duration > 0")
+        assert page.evaluate("viewer.animator.duration") == pytest.approx(1.0, abs=1 / 30)
+        shots = []
+        for time in (0.0, 1.0):
+            page.evaluate(f"viewer.animator.pause(); viewer.animator.seek({time})")
+            page.wait_for_timeout(500)
+            shots.append(_pixels(page.screenshot()))
+    assert np.abs(shots[0] - shots[1]).max() > 0.2
 
 
 @pytest.mark.parametrize("width", [360, 1000])
