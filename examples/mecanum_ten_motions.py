@@ -34,7 +34,9 @@ def main() -> None:
     table = Table("Motion", "Table 1 (rad/s)", "J v_xyw_B (rad/s)", "Position error", "Yaw error")
     for motion, printed in track(TABLE_1.items(), description="Simulating", transient=True):
         scenario = rb.load_scenario(f"mecanum_{motion}")
-        wheel_speeds = dict(zip(kinematics.robot.wheel_names, kinematics.inverse(scenario.command.v_xyw_B), strict=True))
+        wheel_speeds = dict(
+            zip(kinematics.robot.wheel_names, kinematics.inverse(scenario.command.v_xyw_B), strict=True)
+        )
         error = rb.run(scenario, save=False).summary["pose_error"]
         percent = error["percent_of_path"]
         table.add_row(

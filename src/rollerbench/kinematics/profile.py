@@ -11,7 +11,7 @@ from rollerbench.kinematics import odometry
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Profile:
     """A vector over time as cubic Hermite pieces: body twist, or wheel speeds.
 
@@ -46,8 +46,9 @@ class Profile:
 
     @property
     def peak(self) -> Array:
-        """Largest sizes (n,) at the breaks; Hermite pieces between equal or zero slopes do not exceed them."""
-        peak: Array = np.abs(self.values).max(axis=0)
+        """Largest sizes (n,), from 16 samples a piece."""
+        fine = np.interp(np.arange(16 * (len(self.breaks) - 1) + 1) / 16, np.arange(len(self.breaks)), self.breaks)
+        peak: Array = np.abs(self(fine)).max(axis=0)
         return peak
 
     @property
@@ -55,8 +56,27 @@ class Profile:
         return CubicHermiteSpline(self.breaks, self.values, self.slopes)
 
 
+def sum_of_steps(starts: ArrayLike, stops: ArrayLike, heights: ArrayLike) -> Profile:
+    """Sum of cubic steps h s^2 (3 - 2s), s = (t - start) / (stop - start) from 0 to 1: the STEP function of ADAMS.
+
+    Args:
+        starts: Times (k,) at which the steps begin [s].
+        stops: Times (k,) at which they end, later than they begin [s].
+        heights: Heights (k, n).
+    """
+    start, stop = np.asarray(starts, dtype=np.float64), np.asarray(stops, dtype=np.float64)
+    height = np.asarray(heights, dtype=np.float64)
+    breaks = np.unique(np.concatenate([start, stop]))
+    s = np.clip((breaks[:, np.newaxis] - start) / (stop - start), 0.0, 1.0)
+    return Profile(
+        breaks=breaks,
+        values=(s**2 * (3 - 2 * s)) @ height,
+        slopes=(6 * s * (1 - s) / (stop - start)) @ height,
+    )
+
+
 def held_with_ramps(value: ArrayLike, duration: float, ramp: float) -> Profile:
-    """From zero to a value (n,) and back at the end, each in the time ramp by the cubic step s^2 (3 - 2s).
+    """From zero to a value (n,) and back at the end, each in the time ramp by a cubic step.
 
     Args:
         value: What is held in between.
@@ -64,11 +84,7 @@ def held_with_ramps(value: ArrayLike, duration: float, ramp: float) -> Profile:
         ramp: Time of each ramp [s], positive and at most half of the duration.
     """
     held = np.asarray(value, dtype=np.float64)
-    breaks, shape = [0.0, ramp, duration - ramp, duration], [0.0, 1.0, 1.0, 0.0]
-    if duration - 2 * ramp <= 1e-9 * duration:
-        breaks, shape = [0.0, 0.5 * duration, duration], [0.0, 1.0, 0.0]
-    values = np.outer(shape, held)
-    return Profile(breaks=np.array(breaks), values=values, slopes=np.zeros_like(values))
+    return sum_of_steps([0.0, duration - ramp], [ramp, duration], [held, -held])
 
 
 def reference_poses(twist: Profile, time: Array, substeps: int = 4) -> Array:

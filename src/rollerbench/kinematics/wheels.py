@@ -13,7 +13,7 @@ Source: Campion, Bastin, d'Andrea-Novel (1996), section II; Muir and Neuman (198
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
@@ -144,6 +144,28 @@ class WheelKinematics:
         inverse = np.asarray(np.linalg.pinv(stacked), dtype=np.float64)
         return inverse[:, : len(self.drive_matrix)]
 
+    def forward_at(self, wheel_speeds: ArrayLike, swivel_angles: ArrayLike) -> Array:
+        """Twist v_xyw_B (..., 3) of wheel speeds (..., n_driven) [rad/s] while wheels steer.
+
+        Args:
+            wheel_speeds: Speeds of the driven wheels.
+            swivel_angles: Angles (..., n_wheels) of all wheels from heading_deg [rad].
+        """
+        q = _finite("wheel_speeds", wheel_speeds, len(self.drive_matrix))
+        wheels = self.robot.wheels
+        direction = np.array([wheel.heading for wheel in wheels]) + _finite("swivel_angles", swivel_angles, len(wheels))
+        ux, uy = np.cos(direction), np.sin(direction)
+        x, y = self._positions.T
+        along = np.stack([ux, uy, x * uy - y * ux], axis=-1)
+        left = np.stack([-uy, ux, x * ux + y * uy], axis=-1)
+        driven = [i for i, wheel in enumerate(wheels) if wheel.driven]
+        slope = np.array([[wheels[i].roller_slope] for i in driven])
+        radius = np.array([[wheels[i].radius] for i in driven])
+        rows = (along[..., driven, :] + slope * left[..., driven, :]) / radius
+        stacked = np.concatenate([rows, left[..., self._tyre_indices, :]], axis=-2)
+        inverse = np.linalg.pinv(stacked)[..., : len(driven)]
+        return np.einsum("...ij,...j->...i", inverse, q)
+
     def residual(self, wheel_speeds: ArrayLike) -> Array:
         """Part (..., n_driven) of the wheel speeds that no body motion explains [rad/s]: slip, or a wrong radius."""
         q = _finite("wheel_speeds", wheel_speeds, len(self.drive_matrix))
@@ -155,14 +177,19 @@ class WheelKinematics:
         """Sideways speeds (..., m) of the tyres at v_xyw_B (..., 3) [m/s]."""
         return _finite("v_xyw_B", v_xyw_B, 3) @ self.constraint_matrix.T
 
-    def require_feasible(self, v_xyw_B: ArrayLike) -> None:
+    def require_feasible(self, v_xyw_B: ArrayLike, wheels: Sequence[int] | None = None) -> None:
         """Checks that no tyre skids.
+
+        Args:
+            v_xyw_B: Twists (..., 3).
+            wheels: Indices of the tyres to check; by default all.
 
         Raises:
             InfeasibleTwist: naming the tyres and how fast they would skid.
         """
         v = _finite("v_xyw_B", v_xyw_B, 3)
-        skid = self.skid_speeds(v)
+        tyres = self._tyre_indices if wheels is None else list(wheels)
+        skid = v @ self._rows(tyres).T
         if not skid.size:
             return
         size = np.linalg.norm(v * self._scale, axis=-1)[..., np.newaxis]
@@ -171,7 +198,7 @@ class WheelKinematics:
         if not bad.any():
             return
         worst = int(np.argmax(np.where(bad, flat, 0.0).max(axis=-1)))
-        names = [self.robot.wheels[i].name for i, is_bad in zip(self._tyre_indices, bad[worst], strict=True) if is_bad]
+        names = [self.robot.wheels[i].name for i, is_bad in zip(tyres, bad[worst], strict=True) if is_bad]
         speeds = skid.reshape(flat.shape)[worst][bad[worst]]
         twist = ", ".join(f"{x:.4g}" for x in v.reshape(-1, 3)[worst])
         skids = ", ".join(f"{name} at {speed:+.4g} m/s" for name, speed in zip(names, speeds, strict=True))

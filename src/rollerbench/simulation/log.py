@@ -6,7 +6,7 @@ from pydrake.systems.framework import Context
 from scipy.spatial.transform import Rotation
 
 from rollerbench.kinematics.contact import RobotMotion, wheel_contact
-from rollerbench.kinematics.odometry import rotate
+from rollerbench.kinematics.odometry import accumulate, rotate
 from rollerbench.kinematics.profile import reference_poses
 from rollerbench.plant import RobotModel
 from rollerbench.recording import Recording
@@ -30,7 +30,7 @@ def recording_of(station: Station, scenario: Scenario, context: Context, metadat
     data = {name: rows[:end] for name, rows in data.items()}
 
     motion = robot_motion(parts.model, data["state"])
-    reference = scenario.twist_profile
+    reference = scenario.motion.twist
     columns = {"time": time}
     columns |= dict(zip("xyz", motion.p_WB.T, strict=True))
     rpy = Rotation.from_matrix(motion.R_WB).as_euler("xyz")
@@ -38,10 +38,19 @@ def recording_of(station: Station, scenario: Scenario, context: Context, metadat
     columns |= _named(("vx", "vy", "wz"), motion.v_xyw_B)
     columns |= _named(("reference_x", "reference_y", "reference_yaw"), reference_poses(reference, time))
     columns |= _named(("reference_vx", "reference_vy", "reference_wz"), reference(time))
-    columns |= _named(("odometry_x", "odometry_y", "odometry_yaw"), data["odometry_q_xyt"])
+    columns |= _named(("odometry_x", "odometry_y", "odometry_yaw"), _odometry(scenario, motion, data["odometry_q_xyt"]))
     stepping = robot_motion(parts.model, _with_next_velocities(parts.model, data["state"]))
     columns |= _wheel_columns(parts.model, motion, stepping, data["wheel_speed_command"], data["net_actuation"])
     return Recording(columns=columns, wheel_names=scenario.robot.wheel_names, metadata=metadata)
+
+
+def _odometry(scenario: Scenario, motion: RobotMotion, in_the_loop: Array) -> Array:
+    """Poses (n, 3) from measured wheel speeds; where wheels steer on the way, from their measured angles too."""
+    if not scenario.motion.steers:
+        return in_the_loop
+    driven = [index for index, wheel in enumerate(scenario.robot.wheels) if wheel.driven]
+    twist = scenario.motion.kinematics.forward_at(motion.wheel_speeds[:, driven], motion.swivel_angles)
+    return accumulate(np.zeros(3), scenario.plant.time_step * twist[:-1])
 
 
 def robot_motion(model: RobotModel, state: Array) -> RobotMotion:

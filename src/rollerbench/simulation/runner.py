@@ -92,7 +92,7 @@ def run(
 
     if meshcat is not None:
         times = np.arange(0.0, scenario.duration, scenario.plant.time_step)
-        dress_scene(meshcat, scenario.robot, reference_poses(scenario.twist_profile, times))
+        dress_scene(meshcat, scenario.robot, reference_poses(scenario.motion.twist, times))
         meshcat.StartRecording(
             frames_per_second=scenario.recording.frames_per_second, set_visualizations_while_recording=True
         )

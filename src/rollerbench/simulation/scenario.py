@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -11,42 +12,14 @@ from ruamel.yaml.error import YAMLError
 
 from rollerbench.description import Robot, load_robot
 from rollerbench.description.files import read_yaml, validate
-from rollerbench.description.part import Flag, Name, NonNegative, Number, Part, Positive, Vector3
+from rollerbench.description.part import Flag, Name, Number, Part, Positive
 from rollerbench.description.problems import Problem, refuse
 from rollerbench.errors import DescriptionError
 from rollerbench.kinematics import WheelKinematics
-from rollerbench.kinematics.profile import Profile, held_with_ramps
+from rollerbench.kinematics.motion import Motion, twist_motion, wheel_motion
 from rollerbench.plant.servo import DRIVE_TIME_CONSTANT
 from rollerbench.resources import scenario_file
-
-
-class TwistCommand(Part):
-    """A constant body twist between smooth ramps.
-
-    Attributes:
-        v_xyw_B: Twist [vx, vy, wz] that is held [m/s, m/s, rad/s].
-        ramp: Time of the smooth start, and of the smooth stop [s]; one step of the plant at least.
-    """
-
-    type: Literal["twist"] = "twist"
-    v_xyw_B: Vector3
-    ramp: NonNegative = 0.5
-
-
-class WheelSpeedsCommand(Part):
-    """Constant wheel speeds between smooth ramps.
-
-    Attributes:
-        wheel_speeds: Speeds of the driven wheels by name [rad/s]; 0 for those left out.
-        ramp: Time of the smooth start, and of the smooth stop [s]; one step of the plant at least.
-    """
-
-    type: Literal["wheel_speeds"] = "wheel_speeds"
-    wheel_speeds: dict[str, Number]
-    ramp: NonNegative = 0.5
-
-
-Command = Annotated[TwistCommand | WheelSpeedsCommand, Field(discriminator="type")]
+from rollerbench.simulation.commands import Command, WheelSpeedsCommand
 
 
 class OpenLoop(Part):
@@ -155,68 +128,46 @@ class Scenario(Part):
 
     @model_validator(mode="after")
     def _command_fits(self) -> Self:
-        problems = []
-        if 2 * self.command.ramp > self.duration:
-            message = (
-                f"start and stop do not fit into duration = {self.duration}; accepted: up to {self.duration / 2:g}"
-            )
-            problems.append(Problem(("command", "ramp"), message, self.command.ramp))
+        problems = list(self.command.problems(self.robot, self.duration, self.plant.time_step))
         if self.plant.time_step > self.duration:
             message = f"accepted: at most the duration, {self.duration:g}"
             problems.append(Problem(("plant", "time_step"), message, self.plant.time_step))
-        if isinstance(self.command, WheelSpeedsCommand):
-            names = [wheel.name for wheel in self.robot.driven_wheels]
-            for name in self.command.wheel_speeds.keys() - set(names):
-                message = f"not a driven wheel of {self.robot.name}; accepted: {', '.join(names) or 'none'}"
-                problems.append(Problem(("command", "wheel_speeds", name), message))
         refuse(problems)
         return self
 
-    @property
-    def kinematics(self) -> WheelKinematics:
-        """The equations that the controller uses; steered wheels stand as the command needs them."""
-        kinematics = WheelKinematics(self.robot)
-        if isinstance(self.command, TwistCommand) and self.robot.steered_wheels:
-            angles, _ = kinematics.steering(self.command.v_xyw_B)
-            names = [wheel.name for wheel in self.robot.steered_wheels]
-            return kinematics.swivelled({name: float(a) for name, a in zip(names, angles, strict=True)})
-        return kinematics
-
-    @property
-    def wheel_speed_profile(self) -> Profile:
-        """Commanded wheel speeds (n_driven) over time.
+    @cached_property
+    def motion(self) -> Motion:
+        """What the controller makes of the command.
 
         Raises:
-            InfeasibleTwist: the commanded twist would make a tyre skid.
-        """
-        if isinstance(self.command, TwistCommand):
-            kinematics = self.kinematics
-            kinematics.require_feasible(self.command.v_xyw_B)
-            return self.twist_profile.mapped(kinematics.drive_matrix)
-        speeds = self.command.wheel_speeds
-        return self._held([speeds.get(wheel.name, 0.0) for wheel in self.robot.driven_wheels])
-
-    @property
-    def twist_profile(self) -> Profile:
-        """Body twist (3) over time that the equations give for the command.
-
-        Raises:
+            InfeasibleTwist: a tyre would skid.
             KinematicsError: wheel speeds are commanded, and they do not determine the twist.
+            DescriptionError: a wheel would have to turn faster than its max_speed.
         """
-        if isinstance(self.command, TwistCommand):
-            return self._held(self.command.v_xyw_B)
-        return self.wheel_speed_profile.mapped(self.kinematics.forward_matrix)
+        kinematics = WheelKinematics(self.robot)
+        if isinstance(self.command, WheelSpeedsCommand):
+            speeds = self.command.wheel_speed_profile(self.robot, self.duration, self.plant.time_step)
+            motion = wheel_motion(kinematics, speeds)
+        else:
+            twist = self.command.twist(self.robot, self.duration, self.plant.time_step)
+            motion = twist_motion(kinematics, twist, project=self.command.infeasible == "project")
+        self._require_speeds(motion)
+        return motion
 
-    def _held(self, value: Sequence[float]) -> Profile:
-        ramp = min(max(self.command.ramp, self.plant.time_step), 0.5 * self.duration)
-        return held_with_ramps(value, self.duration, ramp)
+    def _require_speeds(self, motion: Motion) -> None:
+        for wheel, peak in zip(self.robot.driven_wheels, motion.wheel_speeds.peak, strict=True):
+            if wheel.max_speed is not None and peak > wheel.max_speed * (1 + 1e-9):
+                raise DescriptionError(
+                    f"{self.name}: the command asks wheel {wheel.name} for {peak:.4g} rad/s; "
+                    f"accepted: up to its max_speed = {wheel.max_speed:g}"
+                )
 
     def step_rule(self) -> tuple[float, str | None]:
         """Largest plant step that follows the rollers' hand-over at the commanded speeds [s], and whose it is.
 
         A wheel may turn by a sixth of its roller pitch in a step. Infinite if no wheel with rollers is commanded.
         """
-        peak = self.wheel_speed_profile.peak
+        peak = self.motion.wheel_speeds.peak
         limits = {
             wheel.name: wheel.ring.pitch / 6 / speed
             for wheel, speed in zip(self.robot.driven_wheels, peak, strict=True)

@@ -19,8 +19,9 @@ from pydrake.trajectories import PiecewisePolynomial
 from rollerbench.errors import DescriptionError
 from rollerbench.kinematics.profile import Profile
 from rollerbench.plant import RobotModel, add_ground, add_robot, servo_gains
+from rollerbench.simulation.commands import WheelSpeedsCommand
 from rollerbench.simulation.drake_config import plant_config
-from rollerbench.simulation.scenario import Scenario, TwistCommand
+from rollerbench.simulation.scenario import Scenario
 from rollerbench.systems import InverseKinematics, Odometry, PlanarState
 from rollerbench.visualization.scene import add_ground_visual, add_meshcat
 
@@ -95,7 +96,7 @@ class Station(Diagram):
         plant.Finalize()
 
         command_port = _add_command(builder, scenario, external=command == "external")
-        _connect_servo(builder, scenario, model, command_port)
+        _connect_servo(builder, scenario, model, command_port, external=command == "external")
         outputs = {
             "state": plant.get_state_output_port(model.model_instance),
             "wheel_speed_command": command_port,
@@ -111,7 +112,7 @@ class Station(Diagram):
         planar = builder.AddNamedSystem("planar_state", PlanarState())
         builder.Connect(body.get_output_port(), planar.GetInputPort("state"))
         outputs |= {name: planar.GetOutputPort(name) for name in ("q_xyt", "v_xyw_B")}
-        odometry = builder.AddNamedSystem("odometry", Odometry(scenario.kinematics, scenario.plant.time_step))
+        odometry = builder.AddNamedSystem("odometry", Odometry(scenario.motion.kinematics, scenario.plant.time_step))
         builder.Connect(outputs["wheel_speeds"], odometry.GetInputPort("wheel_speeds"))
         outputs["odometry_q_xyt"] = odometry.GetOutputPort("q_xyt")
         for name, port in outputs.items():
@@ -147,33 +148,35 @@ def _add_plant(builder: DiagramBuilder, scenario: Scenario) -> tuple[MultibodyPl
 
 def _add_command(builder: DiagramBuilder, scenario: Scenario, *, external: bool) -> OutputPort:
     """The output port of the commanded wheel speeds."""
-    by_twist = external or isinstance(scenario.command, TwistCommand)
-    if not by_twist:
-        profile = scenario.wheel_speed_profile
-        return builder.AddNamedSystem("wheel_speed_command", _source(profile)).get_output_port()
-    kinematics = builder.AddNamedSystem("inverse_kinematics", InverseKinematics(scenario.kinematics))
+    motion = scenario.motion
+    if not external and (motion.steers or isinstance(scenario.command, WheelSpeedsCommand)):
+        return builder.AddNamedSystem("wheel_speed_command", _source(motion.wheel_speeds)).get_output_port()
+    kinematics = builder.AddNamedSystem("inverse_kinematics", InverseKinematics(motion.kinematics))
     if external:
         builder.ExportInput(kinematics.GetInputPort("v_xyw_B"), "v_xyw_B")
     else:
-        scenario.kinematics.require_feasible(scenario.twist_profile.values)
-        twist = builder.AddNamedSystem("twist_command", _source(scenario.twist_profile))
+        twist = builder.AddNamedSystem("twist_command", _source(motion.twist))
         builder.Connect(twist.get_output_port(), kinematics.GetInputPort("v_xyw_B"))
     return kinematics.GetOutputPort("wheel_speeds")
 
 
-def _connect_servo(builder: DiagramBuilder, scenario: Scenario, model: RobotModel, command_port: OutputPort) -> None:
-    robot, plant = scenario.robot, model.plant
+def _connect_servo(
+    builder: DiagramBuilder, scenario: Scenario, model: RobotModel, command_port: OutputPort, *, external: bool
+) -> None:
+    plant = model.plant
     if not model.actuators:
         return
     servo = builder.AddNamedSystem("servo_command", MatrixGain(model.desired_state_matrix()))
     builder.Connect(servo.get_output_port(), plant.get_desired_state_input_port(model.model_instance))
-    if not robot.steered_wheels:
+    if not scenario.robot.steered_wheels:
         builder.Connect(command_port, servo.get_input_port())
         return
-    swivel = dict(zip(robot.wheel_names, scenario.kinematics.swivel_angles, strict=True))
-    angles = [float(swivel[wheel.name]) for wheel in robot.steered_wheels]
-    steering = builder.AddNamedSystem("steering_command", ConstantVectorSource(angles))
-    both = builder.AddNamedSystem("motor_commands", Multiplexer([command_port.size(), len(angles)]))
+    angles = scenario.motion.steering_angles
+    source = ConstantVectorSource(angles(0.0)) if external else _source(angles)
+    steering = builder.AddNamedSystem("steering_command", source)
+    both = builder.AddNamedSystem(
+        "motor_commands", Multiplexer([command_port.size(), steering.get_output_port().size()])
+    )
     builder.Connect(command_port, both.get_input_port(0))
     builder.Connect(steering.get_output_port(), both.get_input_port(1))
     builder.Connect(both.get_output_port(), servo.get_input_port())
