@@ -3,7 +3,7 @@
 import difflib
 import types
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Union, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
@@ -51,10 +51,10 @@ def problems_of(error: ValidationError, model: type[BaseModel]) -> list[Problem]
     found: list[Problem] = []
     for item in error.errors(include_url=False):
         context: Mapping[str, Any] = item.get("ctx", {})
-        if item["type"] == "problems":
-            found += context["problems"]
-            continue
         location, models = _resolve(item["loc"], model)
+        if item["type"] == "problems":
+            found += [replace(problem, location=(*location, *problem.location)) for problem in context["problems"]]
+            continue
         message, value = item["msg"].removeprefix("Value error, "), item["input"]
         match item["type"]:
             case "extra_forbidden":

@@ -22,7 +22,7 @@ from rollerbench.description.mass import (
 )
 from rollerbench.description.part import Name, Part
 from rollerbench.description.problems import Problem, refuse
-from rollerbench.description.wheels import AnyWheel, RollerWheel
+from rollerbench.description.wheels import AnyWheel, RollerWheel, Wheel
 
 LIFT_TOLERANCE = 0.05
 """A wheel may hang above the ground that the lowest one touches by this share of its radius."""
@@ -99,6 +99,10 @@ class Robot(Part):
         return self
 
 
+def _place(wheel: Wheel) -> tuple[float, ...]:
+    return tuple(round(float(value), 9) for value in wheel.p_BoHo_B)
+
+
 def _name_problems(robot: Robot) -> Iterator[Problem]:
     for index, name in enumerate(robot.wheel_names):
         if name in robot.wheel_names[:index]:
@@ -110,8 +114,8 @@ def _room_problems(robot: Robot) -> Iterator[Problem]:
     for (i, first), (j, second) in itertools.combinations(enumerate(robot.wheels), 2):
         if wheels_overlap(first, second):
             swivels = " (a castor or steered wheel needs room to swivel)" if first.swivels or second.swivels else ""
-            message = f"wheel {second.name} overlaps wheel {first.name} (wheels[{i}] at {first.position}){swivels}"
-            yield Problem(("wheels", j, "position"), message, second.position)
+            message = f"wheel {second.name} overlaps wheel {first.name} (wheels[{i}] at {_place(first)}){swivels}"
+            yield Problem(("wheels", j, "position"), message, _place(second))
 
 
 def _support_problems(robot: Robot) -> Iterator[Problem]:
@@ -123,7 +127,7 @@ def _support_problems(robot: Robot) -> Iterator[Problem]:
                 f"wheel {wheel.name} hangs {lift:.4g} m above the ground; accepted: a height within "
                 f"{LIFT_TOLERANCE * wheel.radius:.3g} m above {ground + wheel.radius:.4g}"
             )
-            yield Problem(("wheels", index, "position"), message, wheel.position)
+            yield Problem(("wheels", index, "position"), message, _place(wheel))
     bottom = robot.body.box_center[2] - 0.5 * robot.body.size[2]
     if bottom <= ground:
         message = (

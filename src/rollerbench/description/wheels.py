@@ -7,9 +7,10 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
-from scipy.special import cotdg
+from scipy.special import cosdg, cotdg, sindg
 
 from rollerbench.description.part import Flag, Name, NonNegative, Number, Part, Positive, PositiveInt
+from rollerbench.description.problems import Problem, refuse
 from rollerbench.description.rollers import RollerRing, largest_count, largest_radius, roller_clearance
 
 FORK_MASS_FRACTION = 0.1
@@ -47,7 +48,10 @@ class Wheel(Part):
         name: Unique name of the wheel.
         position: p_BoHo_B [m]: x forward, y left, and optionally z up. For a castor and a steered wheel the point
             where the swivel axis meets axle height.
-        heading_deg: Rolling direction about +z from body x; for a castor and a steered wheel at swivel angle 0.
+        distance: Distance of the wheel from Bo at axle height, with azimuth_deg instead of position [m].
+        azimuth_deg: Direction from Bo to the wheel about +z from body x.
+        heading_deg: Rolling direction about +z from body x; for a castor and a steered wheel at swivel angle 0. By
+            default 0; with azimuth_deg along the circle about Bo, counter-clockwise.
         radius: Radius of the wheel [m], to the envelope of its rollers if it has any.
         width: Width along the axle [m].
         mass: Mass of the whole wheel [kg], rollers and fork included.
@@ -60,8 +64,10 @@ class Wheel(Part):
 
     name: Name
     type: str
-    position: Annotated[tuple[Number, ...], Field(min_length=2, max_length=3)]
-    heading_deg: Number = 0.0
+    position: Annotated[tuple[Number, ...] | None, Field(min_length=2, max_length=3)] = None
+    distance: Positive | None = None
+    azimuth_deg: Number | None = None
+    heading_deg: Number | None = None
     radius: Positive
     width: Positive
     mass: Positive
@@ -74,12 +80,22 @@ class Wheel(Part):
     @property
     def p_BoHo_B(self) -> NDArray[np.float64]:
         """Position (3,) of the wheel's reference point from Bo, in B [m]."""
-        return np.array([*self.position, 0.0][:3])
+        if self.position is not None:
+            return np.array([*self.position, 0.0][:3])
+        distance, azimuth = self.distance or 0.0, self.azimuth_deg or 0.0
+        return np.array([distance * cosdg(azimuth), distance * sindg(azimuth), 0.0])
+
+    @property
+    def heading_degrees(self) -> float:
+        """Rolling direction about +z from body x [deg], given or by default."""
+        if self.heading_deg is not None:
+            return self.heading_deg
+        return 0.0 if self.azimuth_deg is None else self.azimuth_deg + 90.0
 
     @property
     def heading(self) -> float:
         """Rolling direction about +z from body x [rad]."""
-        return math.radians(self.heading_deg)
+        return math.radians(self.heading_degrees)
 
     @property
     def swivel_offset(self) -> float:
@@ -115,6 +131,16 @@ class Wheel(Part):
         """Position (3,) of the wheel's centre from Bo, in B, at swivel angle 0 [m]."""
         behind = np.array([math.cos(self.heading), math.sin(self.heading), 0.0])
         return self.p_BoHo_B - self.swivel_offset * behind
+
+    @model_validator(mode="after")
+    def _has_one_place(self) -> Self:
+        polar = [field for field in ("distance", "azimuth_deg") if getattr(self, field) is not None]
+        if self.position is None and len(polar) < 2:
+            refuse([Problem(("position",), "this field is required (or distance and azimuth_deg instead of it)")])
+        if self.position is not None and polar:
+            message = f"given besides {' and '.join(polar)}; accepted: one or the other"
+            refuse([Problem(("position",), message, self.position)])
+        return self
 
 
 class FixedWheel(Wheel):

@@ -334,7 +334,7 @@ class WheelKinematics:
 
     def _along(self, index: int) -> Array:
         """row(t) (3,) of a wheel."""
-        degrees = self.robot.wheels[index].heading_deg + math.degrees(self.swivel_angles[index])
+        degrees = self.robot.wheels[index].heading_degrees + math.degrees(self.swivel_angles[index])
         # Exact at multiples of 90 deg, as cos(radians(90)) is not.
         ux, uy = float(cosdg(degrees)), float(sindg(degrees))
         x, y = self._positions[index]

@@ -66,17 +66,21 @@ class RobotModel:
         ]
 
     def desired_state_matrix(self) -> NDArray[np.float64]:
-        """Matrix (2 n_actuators, n_driven + n_steered) from [wheel_speeds; steering_angles] to the servo's [q; v].
+        """Matrix (2 n_actuators, n_driven + 2 n_steered) to the servo's [q; v].
+
+        It takes [wheel_speeds; steering_angles; steering_rates].
 
         Drive servos have no stiffness, so their desired angles stay 0; steering servos hold angles.
         """
         robot, actuators = self.robot, self.actuators
         row = {actuator.joint().name(): index for index, actuator in enumerate(actuators)}
-        matrix = np.zeros((2 * len(actuators), len(robot.driven_wheels) + len(robot.steered_wheels)))
+        matrix = np.zeros((2 * len(actuators), len(robot.driven_wheels) + 2 * len(robot.steered_wheels)))
         for column, wheel in enumerate(robot.driven_wheels):
             matrix[len(actuators) + row[names.drive_joint(wheel.name)], column] = 1.0
         for column, wheel in enumerate(robot.steered_wheels, start=len(robot.driven_wheels)):
             matrix[row[names.swivel_joint(wheel.name)], column] = 1.0
+            rate = column + len(robot.steered_wheels)
+            matrix[len(actuators) + row[names.swivel_joint(wheel.name)], rate] = 1.0
         return matrix
 
     def wheel_speed_matrix(self) -> NDArray[np.float64]:

@@ -90,7 +90,7 @@ def _limits(robot: Robot) -> Table:
     for wheel in robot.wheels:
         x, y, _ = wheel.p_BoHo_B
         angle = getattr(wheel, "roller_angle_deg", None)
-        cells = (x, y, wheel.heading_deg, wheel.radius, angle, wheel.ring.count if wheel.ring else None)
+        cells = (x, y, wheel.heading_degrees, wheel.radius, angle, wheel.ring.count if wheel.ring else None)
         limits = (wheel.max_speed, wheel.max_effort, wheel.friction)
         driven = "yes" if wheel.driven else "no"
         table.add_row(wheel.name, wheel.type, *map(_cell, cells), driven, *map(_cell, limits))

@@ -73,7 +73,7 @@ def _add_body(model: etree._Element, robot: Robot) -> None:
 
 
 def _add_wheel(model: etree._Element, robot: Robot, wheel: AnyWheel) -> None:
-    heading = Rotation.from_euler("z", wheel.heading_deg, degrees=True)
+    heading = Rotation.from_euler("z", wheel.heading_degrees, degrees=True)
     carrier, position, rotation = names.BODY, wheel.center_B, heading
     if wheel.swivels:
         carrier = names.fork(wheel.name)

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
 from pydrake.geometry import Meshcat, SceneGraph
 from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant
 from pydrake.systems.framework import Diagram, DiagramBuilder, OutputPort
@@ -172,16 +173,16 @@ def _connect_servo(
         builder.Connect(command_port, servo.get_input_port())
         return
     angles = scenario.motion.steering_angles
-    source = ConstantVectorSource(angles(0.0)) if external else _source(angles)
-    steering = builder.AddNamedSystem("steering_command", source)
-    both = builder.AddNamedSystem(
-        "motor_commands", Multiplexer([command_port.size(), steering.get_output_port().size()])
-    )
+    held = ConstantVectorSource(np.concatenate([angles(0.0), np.zeros(angles.values.shape[1])]))
+    source = held if external else _source(angles, with_rates=True)
+    steering = builder.AddNamedSystem("steering_command", source).get_output_port()
+    both = builder.AddNamedSystem("motor_commands", Multiplexer([command_port.size(), steering.size()]))
     builder.Connect(command_port, both.get_input_port(0))
-    builder.Connect(steering.get_output_port(), both.get_input_port(1))
+    builder.Connect(steering, both.get_input_port(1))
     builder.Connect(both.get_output_port(), servo.get_input_port())
 
 
-def _source(profile: Profile) -> TrajectorySource:
+def _source(profile: Profile, *, with_rates: bool = False) -> TrajectorySource:
+    """Values of a profile over time, followed by their time derivatives if asked for."""
     trajectory = PiecewisePolynomial.CubicHermite(profile.breaks, profile.values.T, profile.slopes.T)
-    return TrajectorySource(trajectory)
+    return TrajectorySource(trajectory, output_derivative_order=int(with_rates), zero_derivatives_beyond_limits=True)

@@ -1,0 +1,117 @@
+"""Commands of scenarios on shipped robots: accepted, refused with the reason, projected, simulated."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+import rollerbench as rb
+
+BASE: dict[str, Any] = {"name": "base", "robot": "youbot_base", "duration": 4.0, "recording": {"html": False}}
+CART = {**BASE, "robot": "differential_cart"}
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        ({"type": "twist"}, ["v_xyw_B: this field is required"]),
+        ({"type": "twist", "pieces": [{"duration": 5.0, "v_xyw_B": [1, 0, 0]}]}, ["last 5 s", "at most"]),
+        (
+            {"type": "twist", "ramp": 1.0, "pieces": [{"duration": 0.5, "v_xyw_B": [1, 0, 0]}]},
+            ["duration = 0.5", "ramp"],
+        ),
+        ({"type": "wheel_speeds", "steps": {"left": []}}, ["steps.left", "front_left", "all"]),
+        (
+            {"type": "wheel_speeds", "steps": {"all": [{"start": 1, "stop": 1, "height_deg": 5}]}},
+            ["stop = 1.0", "later than start"],
+        ),
+        ({"type": "path", "name": "helix"}, ["command.name = 'helix'", "'figure_eight'"]),
+        ({"type": "path", "name": "arc", "radius": 1.0}, ["angle_deg: this field is required for a arc"]),
+        ({"type": "path", "name": "circle", "radius": 1.0, "length": 2.0}, ["length: a circle has none", "radius"]),
+        ({"type": "path", "name": "line", "length": 4.0, "speed": 0.1}, ["command.speed = 0.1", "takes 53"]),
+        ({"type": "waypoints", "waypoints": [[1]]}, ["waypoints[0] = [1]", "at least 2"]),
+        ({"type": "waypoints", "waypoints": [[0, 0]]}, ["no length"]),
+    ],
+)
+def test_a_fault_is_named(command: dict[str, Any], words: list[str]) -> None:
+    with pytest.raises(rb.DescriptionError) as caught:
+        rb.load_scenario({**BASE, "command": command})
+    for word in words:
+        assert word in str(caught.value)
+
+
+def test_pieces_follow_each_other() -> None:
+    pieces = [{"duration": 2.0, "v_xyw_B": [0.3, 0, 0]}, {"duration": 2.0, "v_xyw_B": [0, 0, 0.5]}]
+    scenario = rb.load_scenario({**BASE, "command": {"type": "twist", "pieces": pieces, "ramp": 0.4}})
+    twist = scenario.motion.twist
+    assert twist([1.0, 3.0, 4.0]) == pytest.approx(np.array([[0.3, 0, 0], [0, 0, 0.5], [0, 0, 0]]), abs=1e-12)
+    # Every change takes 0.4 s from the start of its piece; the stop is the end of the last piece.
+    assert twist.integral(np.array([0.0, 4.0]))[0] == pytest.approx([0.3 * 2.0, 0, 0.5 * 1.6], abs=1e-12)
+
+
+def test_a_tyre_that_would_skid_is_named_or_the_twist_projected() -> None:
+    command = {"type": "path", "name": "arc", "radius": 1.0, "angle_deg": 60, "heading": "fixed"}
+    with pytest.raises(rb.InfeasibleTwist, match=r"skid sideways \(left at .* right at"):
+        _ = rb.load_scenario({**CART, "command": command}).motion
+    projected = rb.load_scenario({**CART, "command": {**command, "infeasible": "project"}}).motion.twist
+    assert projected(np.linspace(0, 4, 50))[:, 1] == pytest.approx(np.zeros(50), abs=1e-12)
+
+
+def test_a_cart_looks_along_its_path_unless_told_otherwise() -> None:
+    command = {"type": "path", "name": "square", "length": 0.5}
+    cart = rb.load_scenario({**CART, "command": command}).motion.twist(np.linspace(0, 4, 400))
+    youbot = rb.load_scenario({**BASE, "command": command}).motion.twist(np.linspace(0, 4, 400))
+    assert np.abs(cart[:, 1]).max() < 1e-12 < np.abs(cart[:, 2]).max()
+    assert np.abs(youbot[:, 2]).max() < 1e-12 < np.abs(youbot[:, 1]).max()
+
+
+def test_a_wheel_is_not_asked_beyond_its_limit() -> None:
+    with pytest.raises(rb.DescriptionError, match=r"asks wheel front_left for 42.11 rad/s; accepted: up to .* 30"):
+        _ = rb.load_scenario({**BASE, "command": {"type": "twist", "v_xyw_B": [2.0, 0, 0]}}).motion
+
+
+def test_straight_run_of_wang_in_drake() -> None:
+    """Wang et al. (2016), figures 9 to 11: 0.4202 m; sideways below 0.1 mm, yaw below 0.01 deg."""
+    result = rb.run("six_wheel_straight", save=False)
+    x, y, yaw = result.summary["simulated_final_pose"]
+    assert x == pytest.approx(0.4202, abs=3e-4)
+    assert abs(y) < 1e-4
+    assert abs(math.degrees(yaw)) < 0.01
+
+
+def test_pivot_of_wang_in_drake() -> None:
+    """Wang et al. (2016), figures 12 to 15: 65.01 deg clockwise; the centre stays, with the mass in the middle."""
+    result = rb.run("six_wheel_pivot", save=False)
+    assert math.degrees(result.summary["reference_final_pose"][2]) == pytest.approx(-65.01, abs=0.005)
+    assert math.degrees(result.summary["simulated_final_pose"][2]) == pytest.approx(-65.01, rel=0.005)
+    assert result.summary["pose_error"]["max_position"] < 1e-3
+
+
+@pytest.mark.parametrize("name", ["cart_arc", "cart_tight_arc", "cart_turn"])
+def test_arcs_of_the_cart(name: str) -> None:
+    error = rb.run(rb.load_scenario(name, overrides={"recording.html": False}), save=False).summary["pose_error"]
+    assert error["percent_of_path"] is None or error["percent_of_path"] < 0.2
+    assert abs(error["final_yaw"]) < math.radians(0.3)
+
+
+@pytest.mark.parametrize("name", ["swerve_crab", "swerve_arc", "swerve_figure_eight"])
+def test_swerve(name: str) -> None:
+    """Also where the wheels steer on the way: the odometry then uses their measured angles."""
+    summary = rb.run(rb.load_scenario(name, overrides={"recording.html": False}), save=False).summary
+    assert summary["pose_error"]["percent_of_path"] < 0.5
+    assert summary["pose_error"]["max_yaw"] < math.radians(0.3)
+    odometry, simulated = summary["odometry_final_pose"], summary["simulated_final_pose"]
+    assert np.hypot(odometry[0] - simulated[0], odometry[1] - simulated[1]) < 0.003 * summary["path_length"]
+
+
+def test_a_wheel_placed_by_azimuth() -> None:
+    """Omni wheels at azimuth a, rolling along the circle: the row is [-sin a, cos a, d] / R."""
+    robot = rb.load_robot("omni_platform")
+    azimuth = np.radians([wheel.azimuth_deg for wheel in robot.wheels])
+    expected = np.column_stack([-np.sin(azimuth), np.cos(azimuth), np.full(4, 0.28)]) / 0.09
+    assert rb.WheelKinematics(robot).drive_matrix == pytest.approx(expected, abs=1e-12)
+    data = robot.model_dump(mode="json", exclude_none=True)
+    data["wheels"][0]["position"] = [0.2, 0.2]
+    with pytest.raises(rb.DescriptionError, match=r"wheels\[0\].position .* besides distance and azimuth_deg"):
+        rb.load_robot(data)
