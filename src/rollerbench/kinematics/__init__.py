@@ -2,6 +2,7 @@
 
 from rollerbench.kinematics import odometry
 from rollerbench.kinematics.mobility import Mobility
-from rollerbench.kinematics.wheels import WheelKinematics, finite_roller_factor
+from rollerbench.kinematics.rows import finite_roller_factor
+from rollerbench.kinematics.wheels import WheelKinematics
 
 __all__ = ["Mobility", "WheelKinematics", "finite_roller_factor", "odometry"]

@@ -20,12 +20,12 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import cosdg, sindg
 
-from rollerbench.description import AnyWheel, Robot, load_robot
+from rollerbench.description import Robot, load_robot
 from rollerbench.description.wheels import RollerWheel
 from rollerbench.errors import InfeasibleTwist, KinematicsError
 from rollerbench.kinematics.mobility import Mobility, degree_of_mobility, null_space
+from rollerbench.kinematics.rows import finite_roller_slope, wheel_rows
 
 Array = NDArray[np.float64]
 SKID_TOLERANCE = 1e-9
@@ -79,17 +79,12 @@ class WheelKinematics:
     @cached_property
     def drive_matrix(self) -> Array:
         """J (n_driven, 3): wheel_speeds = J @ v_xyw_B. Columns [rad/m], [rad/m], [-]."""
-        rows = []
-        for index, wheel in enumerate(self.robot.wheels):
-            if wheel.driven:
-                slope = finite_roller_slope(wheel) if self.rollers == "finite" else wheel.roller_slope
-                rows.append((self._along(index) + slope * self._left(index)) / wheel.radius)
-        return np.array(rows).reshape(-1, 3)
+        return self._drive_rows(*self._rows)
 
     @cached_property
     def constraint_matrix(self) -> Array:
         """C (m, 3): sideways speeds [m/s] of fixed and steered tyres, which must vanish: C @ v_xyw_B = 0."""
-        return self._rows(self._tyre_indices)
+        return self._rows[1][self._tyre_indices]
 
     @cached_property
     def roller_matrix(self) -> Array:
@@ -97,12 +92,10 @@ class WheelKinematics:
 
         Positive where the wheel's centre moves across the roller's axis towards +y of the wheel.
         """
-        rows = [
-            self._left(index) * math.hypot(1.0, wheel.roller_slope)
-            for index, wheel in enumerate(self.robot.wheels)
-            if isinstance(wheel, RollerWheel)
-        ]
-        return np.array(rows).reshape(-1, 3)
+        wheels = self.robot.wheels
+        indices = [i for i, wheel in enumerate(wheels) if isinstance(wheel, RollerWheel)]
+        stretch = np.array([math.hypot(1.0, wheels[i].roller_slope) for i in indices])
+        return self._rows[1][indices] * stretch[:, np.newaxis]
 
     # Twist and wheel speeds
 
@@ -152,18 +145,10 @@ class WheelKinematics:
             swivel_angles: Angles (..., n_wheels) of all wheels from heading_deg [rad].
         """
         q = _finite("wheel_speeds", wheel_speeds, len(self.drive_matrix))
-        wheels = self.robot.wheels
-        direction = np.array([wheel.heading for wheel in wheels]) + _finite("swivel_angles", swivel_angles, len(wheels))
-        ux, uy = np.cos(direction), np.sin(direction)
-        x, y = self._positions.T
-        along = np.stack([ux, uy, x * uy - y * ux], axis=-1)
-        left = np.stack([-uy, ux, x * ux + y * uy], axis=-1)
-        driven = [i for i, wheel in enumerate(wheels) if wheel.driven]
-        slope = np.array([[wheels[i].roller_slope] for i in driven])
-        radius = np.array([[wheels[i].radius] for i in driven])
-        rows = (along[..., driven, :] + slope * left[..., driven, :]) / radius
-        stacked = np.concatenate([rows, left[..., self._tyre_indices, :]], axis=-2)
-        inverse = np.linalg.pinv(stacked)[..., : len(driven)]
+        angles = _finite("swivel_angles", swivel_angles, len(self.robot.wheels))
+        along, left = wheel_rows(self.robot, self._positions, angles)
+        stacked = np.concatenate([self._drive_rows(along, left), left[..., self._tyre_indices, :]], axis=-2)
+        inverse = np.linalg.pinv(stacked)[..., : len(self.drive_matrix)]
         return np.einsum("...ij,...j->...i", inverse, q)
 
     def residual(self, wheel_speeds: ArrayLike) -> Array:
@@ -189,7 +174,7 @@ class WheelKinematics:
         """
         v = _finite("v_xyw_B", v_xyw_B, 3)
         tyres = self._tyre_indices if wheels is None else list(wheels)
-        skid = v @ self._rows(tyres).T
+        skid = v @ self._rows[1][tyres].T
         if not skid.size:
             return
         size = np.linalg.norm(v * self._scale, axis=-1)[..., np.newaxis]
@@ -252,7 +237,7 @@ class WheelKinematics:
         v = _finite("v_xyw_B", v_xyw_B, 3)
         castors = [i for i, wheel in enumerate(self.robot.wheels) if wheel.swivel_offset > 0]
         trails = np.array([self.robot.wheels[i].swivel_offset for i in castors])
-        return v @ self._rows(castors).T / trails - v[..., 2:3]
+        return v @ self._rows[1][castors].T / trails - v[..., 2:3]
 
     # Measures
 
@@ -260,7 +245,7 @@ class WheelKinematics:
         """Degrees of mobility, steerability and manoeuvrability, whatever the present swivel angles."""
         fixed = [i for i in self._tyre_indices if not self.robot.wheels[i].swivels]
         steered = [i for i in self._tyre_indices if self.robot.wheels[i].swivels]
-        return degree_of_mobility(self._rows(fixed) / self._scale, self._positions[steered] / self._scale[2])
+        return degree_of_mobility(self._rows[1][fixed] / self._scale, self._positions[steered] / self._scale[2])
 
     def icr(self, v_xyw_B: ArrayLike) -> Array:
         """Instantaneous centre of rotation p_CoICR_B (..., 2) from the reference point [m].
@@ -332,23 +317,18 @@ class WheelKinematics:
             if not isinstance(wheel, RollerWheel) and wheel.swivel_offset == 0
         ]
 
-    def _along(self, index: int) -> Array:
-        """row(t) (3,) of a wheel."""
-        degrees = self.robot.wheels[index].heading_degrees + math.degrees(self.swivel_angles[index])
-        # Exact at multiples of 90 deg, as cos(radians(90)) is not.
-        ux, uy = float(cosdg(degrees)), float(sindg(degrees))
-        x, y = self._positions[index]
-        return np.array([ux, uy, x * uy - y * ux])
+    @cached_property
+    def _rows(self) -> tuple[Array, Array]:
+        """row(t) and row(n) (n_wheels, 3) of all wheels at their swivel angles."""
+        return wheel_rows(self.robot, self._positions, self.swivel_angles)
 
-    def _left(self, index: int) -> Array:
-        """row(n) (3,) of a wheel."""
-        ux, uy, _ = self._along(index)
-        x, y = self._positions[index]
-        return np.array([-uy, ux, x * ux + y * uy])
-
-    def _rows(self, indices: list[int]) -> Array:
-        """row(n) (len(indices), 3) of some wheels."""
-        return np.array([self._left(index) for index in indices]).reshape(-1, 3)
+    def _drive_rows(self, along: Array, left: Array) -> Array:
+        """Drive rows (..., n_driven, 3) from row(t) and row(n) (..., n_wheels, 3)."""
+        slope_of = finite_roller_slope if self.rollers == "finite" else (lambda wheel: wheel.roller_slope)
+        driven = [i for i, wheel in enumerate(self.robot.wheels) if wheel.driven]
+        slope = np.array([[slope_of(self.robot.wheels[i])] for i in driven]).reshape(-1, 1)
+        radius = np.array([[self.robot.wheels[i].radius] for i in driven]).reshape(-1, 1)
+        return (along[..., driven, :] + slope * left[..., driven, :]) / radius
 
     def _swivel_by_name(self) -> dict[str, float]:
         return {w.name: float(a) for w, a in zip(self.robot.wheels, self.swivel_angles, strict=True) if w.swivels}
@@ -359,28 +339,6 @@ class WheelKinematics:
             return "none: its tyres allow no motion at all"
         columns = [column / np.abs(column).max() for column in basis.T]
         return " and ".join("[" + ", ".join(f"{x:.3g}" for x in column + 0.0) + "]" for column in columns)
-
-
-def finite_roller_slope(wheel: AnyWheel) -> float:
-    """tan(g) that makes the textbook row equal to the mean over one roller pitch [-].
-
-    With the touching roller turned by theta from the bottom, |theta| <= pi/N, its contact lies
-    (R - r) tan(theta) cot(gamma) along the axle and its axis makes tan(gamma') = tan(gamma) cos(theta) with the axle on
-    the ground. Rolling without slip along it gives, in the wheel's frame,
-
-        R q' = vx - vy cot(gamma) sec(theta) - w (R - r) cot(gamma) tan(theta).
-
-    At constant q' and w = 0, vy is proportional to cos(theta), whose mean over the pitch is sin(pi/N)/(pi/N): the wheel
-    acts like one with tan(gamma_eff) = tan(gamma) sin(pi/N)/(pi/N). Omni wheels (gamma = 90 deg) and tyres stay.
-    """
-    if not isinstance(wheel, RollerWheel):
-        return 0.0
-    return wheel.roller_slope / finite_roller_factor(wheel.rollers.count)
-
-
-def finite_roller_factor(count: int) -> float:
-    """sin(pi/N)/(pi/N): how far a Mecanum base with N rollers a wheel moves sideways, over the textbook way [-]."""
-    return float(np.sinc(1 / count))
 
 
 def _wrap(angle: Array) -> Array:

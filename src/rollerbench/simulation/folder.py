@@ -46,7 +46,7 @@ def write_folder(
         files: dict[str, str | None] = {
             "scenario.yaml": _resolved(scenario),
             "robot.yaml": to_yaml(scenario.robot),
-            "model.sdf": robot_to_sdf(scenario.robot),
+            "model.sdf": robot_to_sdf(scenario.simulated_robot),
             "summary.json": json.dumps(summary, indent=2, allow_nan=False) + "\n",
             "report.html": run_page(summary, figures, has_recording=page is not None),
             "recording.html": page,

@@ -20,6 +20,7 @@ from rollerbench.kinematics.motion import Motion, twist_motion, wheel_motion
 from rollerbench.plant.servo import DRIVE_TIME_CONSTANT
 from rollerbench.resources import scenario_file
 from rollerbench.simulation.commands import Command, WheelSpeedsCommand
+from rollerbench.simulation.imperfections import Errors
 
 
 class OpenLoop(Part):
@@ -61,10 +62,6 @@ class Ground(Part):
     friction: Positive = 0.8
     slope_deg: Annotated[Number, Field(gt=-90, lt=90)] = 0.0
     roll_resistance: Annotated[Number, Field(ge=0, le=0)] = 0.0
-
-
-class Errors(Part):
-    """What differs from robot.yaml in the simulated robot; nothing can be set yet."""
 
 
 class SimulatorSettings(Part):
@@ -129,11 +126,21 @@ class Scenario(Part):
     @model_validator(mode="after")
     def _command_fits(self) -> Self:
         problems = list(self.command.problems(self.robot, self.duration, self.plant.time_step))
+        problems += self.errors.problems(self.robot)
         if self.plant.time_step > self.duration:
             message = f"accepted: at most the duration, {self.duration:g}"
             problems.append(Problem(("plant", "time_step"), message, self.plant.time_step))
         refuse(problems)
         return self
+
+    @cached_property
+    def simulated_robot(self) -> Robot:
+        """The robot with its imperfections.
+
+        Raises:
+            DescriptionError: such a robot cannot stand.
+        """
+        return self.errors.applied(self.robot)
 
     @cached_property
     def motion(self) -> Motion:

@@ -90,10 +90,10 @@ class Station(Diagram):
         builder = DiagramBuilder()
         plant, scene_graph = _add_plant(builder, scenario)
         gains = servo_gains(scenario.robot, time_constant=scenario.controller.servo_time_constant)
-        model = add_robot(plant, scenario.robot, gains=gains)
+        model = add_robot(plant, scenario.simulated_robot, gains=gains)
         add_ground(plant, friction=scenario.ground.friction, slope_deg=scenario.ground.slope_deg)
         if meshcat is not None:
-            add_ground_visual(plant, scenario.robot)
+            add_ground_visual(plant, scenario.simulated_robot)
         plant.Finalize()
 
         command_port = _add_command(builder, scenario, external=command == "external")
