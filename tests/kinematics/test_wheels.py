@@ -22,6 +22,9 @@ lengths = st.floats(0.15, 2.0)
 speeds = st.floats(-5.0, 5.0)
 twists = st.tuples(speeds, speeds, speeds)
 
+MECANUM, KIWI, CART = (rb.WheelKinematics(make()) for make in (robots.mecanum, robots.kiwi, robots.cart))
+MIXED, SWERVE = rb.WheelKinematics(robots.mixed()), rb.WheelKinematics(robots.swerve())
+
 
 @pytest.mark.parametrize(
     ("v_xyw_B", "printed"),
@@ -79,7 +82,7 @@ def test_mecanum_equals_wpilib(base: float, track: float, twist: tuple[float, fl
 @given(speeds, speeds)
 def test_differential_drive_equals_wpilib(forward: float, turn: float) -> None:
     oracle = DifferentialDriveKinematics(0.4).toWheelSpeeds(ChassisSpeeds(forward, 0, turn))
-    ours = 0.1 * rb.WheelKinematics(robots.cart()).inverse([forward, 0, turn])
+    ours = 0.1 * CART.inverse([forward, 0, turn])
     assert ours == pytest.approx([oracle.left, oracle.right], abs=1e-12)
 
 
@@ -99,8 +102,7 @@ def test_swerve_equals_wpilib(base: float, track: float, twist: tuple[float, flo
 
 @given(twists)
 def test_forward_undoes_inverse(twist: tuple[float, float, float]) -> None:
-    for make in (robots.mecanum, robots.kiwi):
-        kinematics = rb.WheelKinematics(make())
+    for kinematics in (MECANUM, KIWI):
         wheel_speeds = kinematics.inverse(twist)
         assert kinematics.forward(wheel_speeds) == pytest.approx(twist, abs=1e-12)
         assert kinematics.residual(wheel_speeds) == pytest.approx(0, abs=1e-10)
@@ -109,7 +111,7 @@ def test_forward_undoes_inverse(twist: tuple[float, float, float]) -> None:
 @given(twists, twists)
 def test_every_wheel_obeys_its_own_contact(twist: tuple[float, float, float], place: tuple[float, ...]) -> None:
     """The velocity of the wheel's centre is rolling along t plus the roller's rolling across its axis."""
-    kinematics = rb.WheelKinematics(robots.mixed()).at(place[:2])
+    kinematics = MIXED.at(place[:2])
     robot = kinematics.robot
     wheel_speeds = kinematics.inverse(twist, strict=False)
     rollers = kinematics.roller_matrix @ twist
@@ -135,7 +137,7 @@ def test_every_wheel_obeys_its_own_contact(twist: tuple[float, float, float], pl
 
 @given(twists, st.tuples(speeds, speeds))
 def test_another_reference_point_is_the_same_motion(twist: tuple[float, ...], point: tuple[float, float]) -> None:
-    kinematics = rb.WheelKinematics(robots.mecanum())
+    kinematics = MECANUM
     vx, vy, w = twist
     moved = [vx - w * point[1], vy + w * point[0], w]
     assert kinematics.at(point).inverse(moved) == pytest.approx(kinematics.inverse(twist), abs=1e-9)
@@ -205,7 +207,7 @@ def test_an_undetermined_twist_is_said() -> None:
 
 @given(twists, st.lists(st.floats(-10, 10), min_size=4, max_size=4))
 def test_a_steered_wheel_takes_the_shorter_turn(twist: tuple[float, ...], previous: list[float]) -> None:
-    kinematics = rb.WheelKinematics(robots.swerve())
+    kinematics = SWERVE
     angles, wheel_speeds = kinematics.steering(twist, previous)
     assert (np.abs(angles - previous) <= 0.5 * np.pi + 1e-12).all()
     free_angles, free_speeds = kinematics.steering(twist)
