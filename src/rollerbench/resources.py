@@ -53,11 +53,14 @@ def _find(name_or_path: str | Path, kind: str, shipped: dict[str, Path]) -> Path
     text = str(name_or_path)
     if text in shipped:
         return shipped[text]
-    path = Path(name_or_path).expanduser()
-    if path.is_dir() and (path / f"{kind}.yaml").is_file():
-        return path / f"{kind}.yaml"
-    if path.is_file():
-        return path
+    try:
+        path = Path(name_or_path).expanduser()
+        if path.is_dir() and (path / f"{kind}.yaml").is_file():
+            return path / f"{kind}.yaml"
+        if path.is_file():
+            return path
+    except (OSError, RuntimeError, ValueError) as error:
+        raise ResourceError(f"no {kind} '{text}': not a path that can be read: {error}") from error
     close = difflib.get_close_matches(text, shipped, n=3)
     hint = f"did you mean {' or '.join(close)}? " if close else ""
     raise ResourceError(

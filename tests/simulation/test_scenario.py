@@ -41,7 +41,7 @@ def test_shipped_scenarios_are_named_by_their_files(name: str) -> None:
         ({"command": {"type": "wheel_speeds", "wheel_speeds": {"left": 1.0}}}, ["wheel_speeds.left", "front_left"]),
         ({"plant": {"roller_model": "half"}}, ["plant.roller_model = 'half'", "'full'"]),
         ({"plant": {"contact_approximation": "tamsi"}}, ["plant.contact_approximation = 'tamsi'", "'lagged'"]),
-        ({"plant": {"time_step": -0.001}}, ["plant.time_step = -0.001", "greater than 0"]),
+        ({"plant": {"time_step": -0.001}}, ["plant.time_step = -0.001", "greater than or equal to"]),
         ({"plant": {"time_step": 0.05}, "duration": 0.04, "command": {**BASE["command"], "ramp": 0.0}}, ["time_step"]),  # type: ignore[dict-item]
         ({"ground": {"roll_resistance": 0.1}}, ["ground.roll_resistance = 0.1"]),
         ({"ground": {"slope_deg": 90}}, ["ground.slope_deg = 90", "less than 90"]),

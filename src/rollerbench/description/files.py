@@ -11,6 +11,7 @@ from pydantic import BaseModel, ValidationError
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from ruamel.yaml.scalarbool import ScalarBoolean
 
 from rollerbench.description.problems import Location, problems_of
 from rollerbench.description.robot import Robot
@@ -52,7 +53,7 @@ def read_yaml(path: Path) -> CommentedMap:
         line = f":{error.problem_mark.line + 1}" if error.problem_mark else ""
         what = str(error.problem or error.context).split("\n")[0]
         raise DescriptionError(f"{path}{line}: not valid YAML: {what}") from error
-    except (YAMLError, ValueError) as error:
+    except (YAMLError, ValueError, RecursionError) as error:
         raise DescriptionError(f"{path}: not valid YAML: {error}") from error
     if not isinstance(data, CommentedMap):
         raise DescriptionError(f"{path}: expected a mapping of keys to values, found {type(data).__name__}")
@@ -131,6 +132,8 @@ def _plain(value: Any) -> Any:
         return {str(key): _plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
         return [_plain(item) for item in value]
+    if isinstance(value, ScalarBoolean):
+        return bool(value)
     for kind in (bool, int, float, str):
         if isinstance(value, kind):
             return value if type(value) is kind else kind(value)

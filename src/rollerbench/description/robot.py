@@ -104,6 +104,8 @@ def _place(wheel: Wheel) -> tuple[float, ...]:
 
 
 def _name_problems(robot: Robot) -> Iterator[Problem]:
+    if robot.name == "world":
+        yield Problem(("name",), "simulators reserve this name; accepted: any other", robot.name)
     for index, name in enumerate(robot.wheel_names):
         if name in robot.wheel_names[:index]:
             message = f"another wheel has this name: accepted: a name not among {', '.join(robot.wheel_names[:index])}"

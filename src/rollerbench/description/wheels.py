@@ -28,7 +28,7 @@ class Rollers(Part):
         damping: Viscous friction of a roller's bearing [N m s].
     """
 
-    count: Annotated[PositiveInt, Field(ge=4)]
+    count: Annotated[PositiveInt, Field(ge=4, le=200)]
     radius: Positive
     rows: Annotated[PositiveInt, Field(le=2)] = 1
     mass: Positive | None = None
@@ -182,6 +182,13 @@ class CastorWheel(Wheel):
     type: Literal["castor"] = "castor"
     trail: Positive
     driven: Flag = False
+
+    @field_validator("driven")
+    @classmethod
+    def _runs_free(cls, driven: bool) -> bool:
+        if driven:
+            raise ValueError("a castor's drive row changes as it swivels; accepted: false, or type: steered")
+        return driven
 
     @property
     def swivel_offset(self) -> float:

@@ -56,7 +56,9 @@ def degree_of_mobility(fixed_rows: NDArray[np.float64], steered_positions: NDArr
     x, y = steered_positions.T
     along, left = twist[0] - twist[2] * y, twist[1] + twist[2] * x
     rows = np.stack([-left, along, x * along + y * left], axis=-1)
-    rows /= np.hypot(along, left)[:, np.newaxis]
+    # A wheel at the only possible centre of rotation stands still and restricts nothing.
+    speed = np.hypot(along, left)
+    rows = rows[speed > RANK_TOLERANCE] / speed[speed > RANK_TOLERANCE, np.newaxis]
     both = np.vstack([fixed_rows, rows])
     rank = 3 - null_space(both).shape[1]
     return Mobility(degree_of_mobility=3 - rank, degree_of_steerability=rank - fixed_rank)

@@ -1,5 +1,6 @@
 """From a commanded twist or commanded wheel speeds to what every motor does, over time."""
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -61,14 +62,20 @@ def twist_motion(kinematics: WheelKinematics, twist: Profile, *, project: bool =
         InfeasibleTwist: a tyre would skid, and project is not set.
     """
     robot = kinematics.robot
+    if project:
+        # Steered wheels follow; only tyres with a fixed axle restrict the twist.
+        fixed = [i for i, wheel in enumerate(robot.wheels) if wheel.type == "fixed"]
+        twist = Profile(
+            breaks=twist.breaks,
+            values=kinematics.project(twist.values, wheels=fixed),
+            slopes=kinematics.project(twist.slopes, wheels=fixed),
+        )
     times = _samples(twist)
     names = [wheel.name for wheel in robot.steered_wheels]
     angles = _steering(kinematics, twist(times))
     start = kinematics.swivelled({name: float(angle) for name, angle in zip(names, angles[0], strict=True)})
     if names and np.ptp(angles, axis=0).max() > 1e-9:
         return _steering_motion(start, twist, times, angles)
-    if project:
-        twist = Profile(breaks=twist.breaks, values=start.project(twist.values), slopes=start.project(twist.slopes))
     start.require_feasible(twist(times))
     return Motion(
         twist=twist,
@@ -105,19 +112,27 @@ def _steering(kinematics: WheelKinematics, twists: Array) -> Array:
     angles = np.zeros((len(twists), n_steered))
     if not n_steered:
         return angles
-    moving = np.flatnonzero(np.abs(twists).max(axis=1) > 1e-9 * max(1e-12, np.abs(twists).max()))
-    if moving.size:
-        angles[0] = kinematics.steering(twists[moving[0]])[0]
-    # One after the other: each wheel turns from where it was.
-    for row in range(1, len(twists)):
-        angles[row] = kinematics.steering(twists[row], previous=angles[row - 1])[0]
+    size = np.abs(twists).max(axis=1)
+    moving = np.flatnonzero(size > 1e-9 * max(1e-12, size.max()))
+    if not moving.size:
+        return angles
+    angles[: moving[0] + 1] = kinematics.steering(twists[moving[0]])[0]
+    # One after the other: each wheel turns from where it was, at rest evenly to where the next motion needs it.
+    for last, row in itertools.pairwise(moving):
+        angles[row] = kinematics.steering(twists[row], previous=angles[last])[0]
+        share = np.arange(1, row - last)[:, np.newaxis] / (row - last)
+        s = share**2 * (3 - 2 * share)
+        angles[last + 1 : row] = angles[last] + s * (angles[row] - angles[last])
+    angles[moving[-1] :] = angles[moving[-1]]
     return angles
 
 
 def _samples(profile: Profile) -> Array:
     """Times at the breaks, and in between as often as steering needs."""
     count = max(2, int(np.ceil(np.ptp(profile.breaks) / STEERING_SAMPLE_TIME)) + 1)
-    return np.unique(np.concatenate([profile.breaks, np.linspace(profile.breaks[0], profile.breaks[-1], count)]))
+    return np.unique(
+        np.round(np.concatenate([profile.breaks, np.linspace(profile.breaks[0], profile.breaks[-1], count)]), 9)
+    )
 
 
 def _interpolated(times: Array, values: Array) -> Profile:

@@ -144,7 +144,7 @@ def through_waypoints(waypoints: Sequence[Sequence[float]], *, tangent: bool) ->
     return [each for each in legs if each.effort(1.0) > 1e-9]
 
 
-def twist_along(legs: Sequence[Leg], duration: float, law: SpeedLaw, radius: float) -> Profile:
+def twist_along(legs: Sequence[Leg], duration: float, law: SpeedLaw, radius: float, pause: float = 0.0) -> Profile:
     """Body twist (3) over time that follows legs one after another, resting in between.
 
     Args:
@@ -152,15 +152,17 @@ def twist_along(legs: Sequence[Leg], duration: float, law: SpeedLaw, radius: flo
         duration: Time of all legs together [s], shared out by `Leg.effort`.
         law: How the parameter of a leg runs in time.
         radius: Radius at which turns count [m].
+        pause: Part of the duration that is spent at rest between the legs, evenly [s].
     """
     efforts = np.array([each.effort(radius) for each in legs])
-    times = np.concatenate([[0.0], np.cumsum(efforts)]) * duration / efforts.sum()
+    moving = efforts * (duration - pause) / efforts.sum()
+    starts = np.concatenate([[0.0], np.cumsum(moving[:-1] + pause / max(1, len(legs) - 1))])
     tau = np.linspace(0, 1, NODES)
     u, rate = _speed_law(law, tau)
     breaks: list[Array] = []
     values: list[Array] = []
     slopes: list[Array] = []
-    for each, start, end in zip(legs, times[:-1], times[1:], strict=True):
+    for each, start, end in zip(legs, starts, starts + moving, strict=True):
         path = CubicSpline(np.linspace(0, 1, len(each.q_xyt)), each.q_xyt)
         pose, derivative = path(u), path(u, 1) * (rate / (end - start))[:, np.newaxis]
         twist = np.column_stack([rotate(-pose[:, 2], derivative[:, :2]), derivative[:, 2]])
@@ -169,7 +171,7 @@ def twist_along(legs: Sequence[Leg], duration: float, law: SpeedLaw, radius: flo
             twist[:, 0], twist[:, 1] = np.hypot(derivative[:, 0], derivative[:, 1]), 0.0
         time = start + tau * (end - start)
         slope = CubicSpline(time, twist, bc_type="clamped")(time, 1)
-        first = 0 if not breaks else 1
+        first = 1 if breaks and pause == 0 else 0
         breaks.append(time[first:])
         values.append(twist[first:])
         slopes.append(slope[first:])

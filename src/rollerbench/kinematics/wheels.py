@@ -31,6 +31,9 @@ Array = NDArray[np.float64]
 SKID_TOLERANCE = 1e-9
 """Sideways speed of a tyre that still counts as none, as a share of the twist's size [-]."""
 
+STANDSTILL = 1e-9
+"""Speed below which a steered wheel stands still [m/s]."""
+
 
 class WheelKinematics:
     """What the wheels of a robot do when its body moves, and the other way round.
@@ -177,7 +180,8 @@ class WheelKinematics:
         skid = v @ self._rows[1][tyres].T
         if not skid.size:
             return
-        size = np.linalg.norm(v * self._scale, axis=-1)[..., np.newaxis]
+        # Measured by the largest twist of a batch: at the ends of a ramp there is little but rounding.
+        size = np.linalg.norm(v * self._scale, axis=-1).max(initial=0.0)
         flat = np.abs(skid).reshape(-1, skid.shape[-1])
         bad = (np.abs(skid) > SKID_TOLERANCE * size).reshape(flat.shape)
         if not bad.any():
@@ -194,10 +198,16 @@ class WheelKinematics:
             tuple(float(speed) for speed in speeds),
         )
 
-    def project(self, v_xyw_B: ArrayLike) -> Array:
-        """The closest twist (..., 3) at which no tyre skids; yaw rates count by the wheels' mean distance."""
+    def project(self, v_xyw_B: ArrayLike, wheels: Sequence[int] | None = None) -> Array:
+        """The closest twist (..., 3) at which no tyre skids; yaw rates count by the wheels' mean distance.
+
+        Args:
+            v_xyw_B: Twists (..., 3).
+            wheels: Indices of the tyres that count; by default all.
+        """
         v = _finite("v_xyw_B", v_xyw_B, 3) * self._scale
-        basis = null_space(self.constraint_matrix / self._scale)
+        tyres = self._tyre_indices if wheels is None else list(wheels)
+        basis = null_space(self._rows[1][tyres] / self._scale)
         return (v @ basis @ basis.T) / self._scale
 
     # Steering
@@ -222,7 +232,8 @@ class WheelKinematics:
         along = v[..., 0:1] - v[..., 2:3] * y
         left = v[..., 1:2] + v[..., 2:3] * x
         speed = np.hypot(along, left)
-        still = speed <= SKID_TOLERANCE * np.linalg.norm(v * self._scale, axis=-1)[..., np.newaxis]
+        size = np.linalg.norm(v * self._scale, axis=-1)[..., np.newaxis]
+        still = speed <= np.maximum(SKID_TOLERANCE * size, STANDSTILL)
         angle = _wrap(np.arctan2(left, along) - heading)
         if previous is None:
             return np.where(still, 0.0, angle), speed / radius

@@ -25,7 +25,7 @@ def robot_list(robots: Iterable[Robot]) -> Table:
         wheels = ", ".join(f"{kinds.count(kind)} {kind}" for kind in dict.fromkeys(kinds))
         mobility = WheelKinematics(robot).mobility()
         degrees = f"({mobility.degree_of_mobility}, {mobility.degree_of_steerability})"
-        table.add_row(robot.name, wheels, f"{robot.mass:.4g}", degrees, robot.summary)
+        table.add_row(robot.name, wheels, f"{robot.mass:.4g}", degrees, escape(robot.summary))
     return table
 
 
@@ -55,14 +55,18 @@ def scenario_list(files: Mapping[str, Path]) -> Table:
     table = Table("Scenario", "Robot", escape("Duration [s]"), "Summary")
     for name, file in files.items():
         data = read_yaml(file)
-        table.add_row(name, str(data.get("robot")), f"{data.get('duration')}", str(data.get("summary", "")))
+        table.add_row(
+            name, escape(str(data.get("robot"))), f"{data.get('duration')}", escape(str(data.get("summary", "")))
+        )
     return table
 
 
 def _measures(robot: Robot, kinematics: WheelKinematics) -> Table:
     mobility, inertia = kinematics.mobility(), robot.inertia
     com = np.round(inertia.com, 9) + 0.0
-    table = Table(title=f"{robot.name}: {robot.summary}", show_header=False, title_justify="left", title_style="bold")
+    table = Table(
+        title=escape(f"{robot.name}: {robot.summary}"), show_header=False, title_justify="left", title_style="bold"
+    )
     table.add_column(style="cyan")
     table.add_column()
     try:
@@ -71,7 +75,7 @@ def _measures(robot: Robot, kinematics: WheelKinematics) -> Table:
     except KinematicsError:
         forward = "not determined by the wheel speeds"
     condition = kinematics.condition_number()
-    table.add_row("Source", robot.source)
+    table.add_row("Source", escape(robot.source))
     table.add_row("Mass", f"{inertia.mass:.6g} kg")
     table.add_row("Centre of mass", "x {:.4g} m, y {:.4g} m, z {:.4g} m".format(*com))
     table.add_row("Yaw inertia", f"{inertia.moment[2, 2]:.4g} kg m2")

@@ -15,7 +15,7 @@ def summary_table(summary: Mapping[str, Any]) -> Table:
     table.add_column(style="cyan", no_wrap=True)
     table.add_column()
     for label, value in summary_rows(summary):
-        table.add_row(label, value)
+        table.add_row(label, escape(value))
     return table
 
 

@@ -13,6 +13,9 @@ from rollerbench.description.problems import Problem
 from rollerbench.kinematics import WheelKinematics, paths
 from rollerbench.kinematics.profile import Profile, held_with_ramps, sum_of_steps
 
+STEERING_PAUSE = 0.5
+"""Rest between the legs of a path in which steered wheels turn to the next [s]."""
+
 Infeasible = Literal["refuse", "project"]
 
 
@@ -61,8 +64,9 @@ class TwistCommand(Part):
             yield Problem(("command", "pieces"), message)
         for index, piece in enumerate(self.pieces):
             room = piece.duration if index < len(self.pieces) - 1 else 0.5 * piece.duration
-            if self.ramp > room:
-                message = f"shorter than the changes take (ramp = {self.ramp:g}); accepted: a longer piece or less ramp"
+            ramp = max(self.ramp, time_step)
+            if ramp > room * (1 + 1e-9):
+                message = f"shorter than the changes take (ramp = {ramp:g}); accepted: a longer piece or less ramp"
                 yield Problem(("command", "pieces", index, "duration"), message, piece.duration)
 
     def twist(self, robot: Robot, duration: float, time_step: float) -> Profile:
@@ -92,7 +96,7 @@ class Step(Part):
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
-        if self.stop <= self.start:
+        if self.stop < self.start + 1e-6:
             raise ValueError(f"stop = {self.stop}: accepted: later than start = {self.start}")
         return self
 
@@ -168,10 +172,16 @@ class _AlongPath(Part):
     def problems(self, robot: Robot, duration: float, time_step: float) -> Iterator[Problem]:
         """A speed too low for the duration."""
         legs = self.legs(robot)
-        if not legs:
+        if sum(each.effort(1.0) for each in legs) < 1e-9:
             yield Problem(("command",), "the path has no length; accepted: one that leads somewhere")
+        elif self._pause(robot, legs) >= duration:
+            message = (
+                f"the rests in which its wheels steer take {self._pause(robot, legs):g} s; accepted: a longer duration"
+            )
+            yield Problem(("command",), message)
         elif self.speed is not None:
             needed = paths.fastest_duration(legs, self.speed, self.speed_law, _turning_radius(robot))
+            needed += self._pause(robot, legs)
             if needed > duration:
                 message = f"the path takes {needed:.4g} s at this speed; accepted: a duration or speed that is larger"
                 yield Problem(("command", "speed"), message, self.speed)
@@ -180,8 +190,12 @@ class _AlongPath(Part):
         """Body twist (3) over time."""
         legs, radius = self.legs(robot), _turning_radius(robot)
         if self.speed is not None:
-            duration = paths.fastest_duration(legs, self.speed, self.speed_law, radius)
-        return paths.twist_along(legs, duration, self.speed_law, radius)
+            duration = paths.fastest_duration(legs, self.speed, self.speed_law, radius) + self._pause(robot, legs)
+        return paths.twist_along(legs, duration, self.speed_law, radius, pause=self._pause(robot, legs))
+
+    def _pause(self, robot: Robot, legs: list[paths.Leg]) -> float:
+        """Time of all rests between legs, in which steered wheels turn [s]."""
+        return STEERING_PAUSE * (len(legs) - 1) if robot.steered_wheels else 0.0
 
     def _tangent(self, robot: Robot) -> bool:
         if self.heading is not None:
@@ -241,6 +255,18 @@ class PathCommand(_AlongPath):
             if getattr(self, field) is not None and field not in may:
                 raise ValueError(f"{field}: a {self.name} has none; accepted: {', '.join(sorted(may))}")
         return self
+
+    def problems(self, robot: Robot, duration: float, time_step: float) -> Iterator[Problem]:
+        """What the path cannot be."""
+        if self.direction_deg and self._tangent(robot):
+            message = "with tangent heading a line leads ahead; accepted: 0, or heading: fixed"
+            yield Problem(("command", "direction_deg"), message, self.direction_deg)
+        through = np.array([(0.0, 0.0), *(self.points or ())])
+        if (np.hypot(*np.diff(through, axis=0).T) < 1e-9).any():
+            message = "two points in a row are one (the start is [0, 0]); accepted: points apart from each other"
+            yield Problem(("command", "points"), message, self.points)
+            return
+        yield from super().problems(robot, duration, time_step)
 
     def legs(self, robot: Robot) -> list[paths.Leg]:
         """The path's legs."""

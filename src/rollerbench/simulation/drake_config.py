@@ -12,7 +12,11 @@ from rollerbench.simulation.scenario import Scenario
 
 Config = TypeVar("Config", MultibodyPlantConfig, SimulatorConfig)
 
-OURS = {"discrete_contact_approximation": "contact_approximation"}
+OURS = {
+    "discrete_contact_approximation": "use plant.contact_approximation",
+    "start_time": "a run starts at 0",
+}
+"""Fields of Drake's that a scenario says otherwise."""
 
 
 def plant_config(scenario: Scenario) -> MultibodyPlantConfig:
@@ -45,12 +49,14 @@ def _apply(section: str, config: Config, extra: Mapping[str, Any]) -> Config:
     for name, value in extra.items():
         accepted = f"accepted: {', '.join(sorted(set(names) - OURS.keys()))}"
         if name in OURS:
-            raise DescriptionError(str(Problem((section, name), f"use {section}.{OURS[name]}", value)))
+            raise DescriptionError(str(Problem((section, name), OURS[name], value)))
         if name not in names:
             raise DescriptionError(str(Problem((section, name), f"not a field of Drake's; {accepted}", value)))
+        kind = type(getattr(config, name)).__name__
+        if isinstance(value, bool) and kind != "bool":
+            raise DescriptionError(str(Problem((section, name), f"accepted: {kind}", value)))
         try:
             setattr(config, name, value)
         except TypeError as error:
-            kind = type(getattr(config, name)).__name__
             raise DescriptionError(str(Problem((section, name), f"accepted: {kind}", value))) from error
     return config

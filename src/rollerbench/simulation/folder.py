@@ -15,6 +15,12 @@ from rollerbench.report.page import run_page
 from rollerbench.sdf import robot_to_sdf
 from rollerbench.simulation.scenario import Scenario
 
+RUN_FILES = {
+    *("scenario.yaml", "robot.yaml", "model.sdf", "recording.parquet", "summary.json"),
+    *("recording.html", "report.html", "figures"),
+}
+"""Everything that a run writes, and so may replace."""
+
 
 def check_folder(folder: Path) -> None:
     """Checks, before anything is computed, that a run may be written there.
@@ -24,8 +30,14 @@ def check_folder(folder: Path) -> None:
     """
     if folder.exists() and not folder.is_dir():
         raise ResourceError(f"{folder}: is a file; accepted: a new folder, or that of an earlier run")
-    if folder.is_dir() and any(folder.iterdir()) and not (folder / "summary.json").is_file():
-        raise ResourceError(f"{folder}: holds something else than a run; accepted: a new folder, or an earlier run's")
+    if folder.resolve() == Path.cwd():
+        raise ResourceError(f"{folder}: is the current folder; accepted: a folder in it, such as runs/name")
+    foreign = sorted({path.name for path in folder.iterdir()} - RUN_FILES) if folder.is_dir() else []
+    if foreign:
+        raise ResourceError(
+            f"{folder}: holds something else than a run ({', '.join(foreign[:3])}); "
+            "accepted: a new folder, or that of an earlier run"
+        )
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=folder.parent).close()

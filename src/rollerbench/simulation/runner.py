@@ -14,7 +14,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator
 from pydrake.systems.framework import Context
 
-from rollerbench.errors import RollerbenchWarning, SimulationError
+from rollerbench.errors import DescriptionError, RollerbenchWarning, SimulationError
 from rollerbench.kinematics.profile import reference_poses
 from rollerbench.recording import Recording
 from rollerbench.simulation.drake_config import simulator_config
@@ -86,9 +86,15 @@ def run(
         meshcat = local_meshcat()
     station = Station(scenario, meshcat=meshcat, log=True)
     simulator = Simulator(station)
-    ApplySimulatorConfig(simulator_config(scenario), simulator)
+    try:
+        ApplySimulatorConfig(simulator_config(scenario), simulator)
+    except (RuntimeError, ValueError, SystemExit) as error:
+        raise DescriptionError(f"simulator: Drake refuses these settings: {error}") from error
     context = simulator.get_mutable_context()
-    _stand_at_rest(simulator, station, scenario)
+    try:
+        _stand_at_rest(simulator, station, scenario)
+    except (RuntimeError, SystemExit) as error:
+        raise SimulationError(f"{scenario.name}: Drake cannot let the robot stand: {error}") from error
 
     if meshcat is not None:
         times = np.arange(0.0, scenario.duration, scenario.plant.time_step)

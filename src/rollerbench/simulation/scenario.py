@@ -1,5 +1,6 @@
 """What a run simulates: robot, command, controller, plant, ground. From and to scenario.yaml."""
 
+import copy
 import math
 from collections.abc import Mapping, Sequence
 from functools import cached_property
@@ -14,7 +15,7 @@ from rollerbench.description import Robot, load_robot
 from rollerbench.description.files import read_yaml, validate
 from rollerbench.description.part import Flag, Name, Number, Part, Positive
 from rollerbench.description.problems import Problem, refuse
-from rollerbench.errors import DescriptionError
+from rollerbench.errors import DescriptionError, RollerbenchError
 from rollerbench.kinematics import WheelKinematics
 from rollerbench.kinematics.motion import Motion, twist_motion, wheel_motion
 from rollerbench.plant.servo import DRIVE_TIME_CONSTANT
@@ -46,7 +47,7 @@ class PlantSettings(Part):
     model_config = ConfigDict(extra="allow")
 
     roller_model: Literal["full"] = "full"
-    time_step: Annotated[Positive, Field(le=0.1)] = 0.005
+    time_step: Annotated[Positive, Field(ge=1e-5, le=0.1)] = 0.005
     contact_approximation: Literal["lagged", "similar"] = "lagged"
 
 
@@ -85,11 +86,21 @@ class RecordingSettings(Part):
 def _robot_from(value: Any, info: ValidationInfo) -> Robot:
     """A Robot from its description, or from a name or path, which is relative to the scenario's folder."""
     folder = (info.context or {}).get("folder")
-    if isinstance(value, str) and folder is not None and (Path(folder) / value).is_file():
-        return load_robot(Path(folder) / value)
-    if isinstance(value, str | Path | Mapping | Robot):
-        return load_robot(value)
+    try:
+        if isinstance(value, str) and folder is not None and _is_robot(Path(folder) / value):
+            return load_robot(Path(folder) / value)
+        if isinstance(value, str | Path | Mapping | Robot):
+            return load_robot(value)
+    except RollerbenchError as error:
+        refuse([Problem((), str(error))])
     raise ValueError("accepted: the name of a shipped robot, a path to a robot.yaml, or a robot's description")
+
+
+def _is_robot(path: Path) -> bool:
+    try:
+        return path.is_file() or (path / "robot.yaml").is_file()
+    except OSError:
+        return False
 
 
 class Scenario(Part):
@@ -112,7 +123,7 @@ class Scenario(Part):
 
     name: Name
     summary: str = ""
-    robot: Annotated[Robot, BeforeValidator(_robot_from)]
+    robot: Annotated[Robot, BeforeValidator(_robot_from, json_schema_input_type=str | Robot)]
     duration: Positive
     command: Command
     controller: OpenLoop = OpenLoop()
@@ -127,6 +138,8 @@ class Scenario(Part):
     def _command_fits(self) -> Self:
         problems = list(self.command.problems(self.robot, self.duration, self.plant.time_step))
         problems += self.errors.problems(self.robot)
+        if not self.robot.driven_wheels:
+            problems.append(Problem(("robot",), "no wheel is driven; accepted: a robot with driven: true somewhere"))
         if self.plant.time_step > self.duration:
             message = f"accepted: at most the duration, {self.duration:g}"
             problems.append(Problem(("plant", "time_step"), message, self.plant.time_step))
@@ -162,6 +175,13 @@ class Scenario(Part):
         return motion
 
     def _require_speeds(self, motion: Motion) -> None:
+        for wheel, rate in zip(self.robot.steered_wheels, motion.steering_angles.peak_rate, strict=True):
+            limit = getattr(wheel, "max_steering_speed", None)
+            if limit is not None and rate > limit * (1 + 1e-9):
+                raise DescriptionError(
+                    f"{self.name}: the command turns wheel {wheel.name} about its swivel axis at {rate:.4g} rad/s; "
+                    f"accepted: up to its max_steering_speed = {limit:g} (slower, or with a rest before the turn)"
+                )
         for wheel, peak in zip(self.robot.driven_wheels, motion.wheel_speeds.peak, strict=True):
             if wheel.max_speed is not None and peak > wheel.max_speed * (1 + 1e-9):
                 raise DescriptionError(
@@ -210,7 +230,7 @@ def load_scenario(
             return source
         data = {name: v if isinstance(v, Robot) else _dumped(v) for name, v in data.items()}
     elif isinstance(source, Mapping):
-        data = dict(source)
+        data = copy.deepcopy(dict(source))
     else:
         path = scenario_file(source)
         data = read_yaml(path)
@@ -235,7 +255,7 @@ def _parsed(overrides: Mapping[str, Any] | Sequence[str]) -> dict[str, Any]:
             raise DescriptionError(f"--set {text!r}: accepted: KEY=VALUE, such as plant.time_step=0.002")
         try:
             result[key.strip()] = YAML(typ="safe", pure=True).load(value)
-        except YAMLError as error:
+        except (YAMLError, ValueError) as error:
             raise DescriptionError(f"--set {text!r}: the value is not valid YAML") from error
     return result
 

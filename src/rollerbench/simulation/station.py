@@ -1,6 +1,7 @@
 """The diagram that a scenario simulates: command, kinematics, servo, plant."""
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -22,7 +23,7 @@ from rollerbench.kinematics.profile import Profile
 from rollerbench.plant import RobotModel, add_ground, add_robot, servo_gains
 from rollerbench.simulation.commands import WheelSpeedsCommand
 from rollerbench.simulation.drake_config import plant_config
-from rollerbench.simulation.scenario import Scenario
+from rollerbench.simulation.scenario import Scenario, load_scenario
 from rollerbench.systems import InverseKinematics, Odometry, PlanarState
 from rollerbench.visualization.scene import add_ground_visual, add_meshcat
 
@@ -130,13 +131,13 @@ class Station(Diagram):
 
 
 def build_station(
-    scenario: Scenario,
+    scenario: Scenario | str | Path,
     *,
     command: Literal["scenario", "external"] = "scenario",
     meshcat: Meshcat | None = None,
 ) -> Station:
     """The diagram of a scenario, to simulate or to compose with other systems. See `Station`."""
-    return Station(scenario, command=command, meshcat=meshcat)
+    return Station(load_scenario(scenario), command=command, meshcat=meshcat)
 
 
 def _add_plant(builder: DiagramBuilder, scenario: Scenario) -> tuple[MultibodyPlant, SceneGraph]:
