@@ -47,16 +47,20 @@ class Profile:
     @property
     def peak(self) -> Array:
         """Largest sizes (n,), from 16 samples a piece."""
-        fine = np.interp(np.arange(16 * (len(self.breaks) - 1) + 1) / 16, np.arange(len(self.breaks)), self.breaks)
-        peak: Array = np.abs(self(fine)).max(axis=0)
+        peak: Array = np.abs(self(self._fine)).max(axis=0)
         return peak
 
     @property
     def peak_rate(self) -> Array:
         """Largest sizes (n,) of the time derivative, from 16 samples a piece."""
-        fine = np.interp(np.arange(16 * (len(self.breaks) - 1) + 1) / 16, np.arange(len(self.breaks)), self.breaks)
-        rate: Array = np.abs(self._spline(fine, 1)).max(axis=0)
+        rate: Array = np.abs(self._spline(self._fine, 1)).max(axis=0)
         return rate
+
+    @property
+    def _fine(self) -> Array:
+        """Times of 16 samples a piece [s]."""
+        pieces = len(self.breaks) - 1
+        return np.interp(np.arange(16 * pieces + 1) / 16, np.arange(pieces + 1), self.breaks)
 
     @property
     def _spline(self) -> CubicHermiteSpline:

@@ -153,7 +153,7 @@ class _AlongPath(Part):
 
     Attributes:
         heading: "tangent": the body looks along the path; "fixed": it keeps its heading, or turns evenly on the way. By
-            default tangent for robots whose degree of mobility is 2 or less.
+            default tangent for robots that cannot move in every direction (degree of manoeuvrability below 3).
         speed: Largest speed of Bo, and of a point at the wheels' mean distance as the body turns [m/s]. By default as
             slow as the scenario's duration allows.
         speed_law: "minimum_jerk", or "trapezoidal" with smooth corners.
