@@ -7,7 +7,7 @@ from rollerbench.description import Robot
 GRAVITY = 9.81
 """Standard value used for derived parameters; Drake's default too [m/s2]."""
 
-PENETRATION_RATIO = 6e-4
+PENETRATION_RATIO = 5e-4
 """Static penetration of a wheel into rigid ground, as a share of its radius: by so much the wheel rolls short [-]."""
 
 
