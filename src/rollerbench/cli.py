@@ -2,10 +2,10 @@
 
 import sys
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Protocol
 
 import typer
 
@@ -99,6 +99,29 @@ def run(
         input("Press Enter to close the live page. ")
 
 
+@app.command(epilog="Example: rollerbench reproduce differential_drive -o reproductions")
+def reproduce(
+    paper: Annotated[
+        str, typer.Argument(help="six_wheel, differential_drive, mecanum, or all.", show_default=True)
+    ] = "all",
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="Folder to write; each paper gets a folder in it.")
+    ] = Path("reproductions"),
+    no_recording: Annotated[
+        bool, typer.Option("--no-recording", help="Runs write no recording.html, which is faster.")
+    ] = False,
+) -> None:
+    """Regenerate the figures and tables of a source paper from theory and from simulation."""
+    from rollerbench import studies
+    from rollerbench.report.reproduction import results_table
+
+    for name in studies.paper_names() if paper == "all" else [paper]:
+        with _progress(name, 0.0) as show:
+            done = studies.reproduce(name, output=output / name, recordings=not no_recording, progress=show)
+        _print(results_table(done.paper.title, [result.to_dict() for result in done.findings.results]))
+        _print(f"Written: {done.folder / 'report.html'}")
+
+
 @app.command(epilog="Example: rollerbench build youbot_base")
 def build(
     robots: Annotated[
@@ -164,9 +187,16 @@ def _clear_messages() -> Iterator[None]:
             raise SystemExit(BAD_INPUT) from None
 
 
+class Show(Protocol):
+    """Moves a progress bar."""
+
+    def __call__(self, now: float, label: str | None = None, total: float | None = None) -> None:
+        """Shows the time now [s], from here on with another label or total if given."""
+
+
 @contextmanager
-def _progress(label: str, total: float) -> Iterator[Callable[[float], None]]:
-    """A progress bar on the terminal's standard error; nothing elsewhere."""
+def _progress(label: str, total: float) -> Iterator[Show]:
+    """A progress bar on the terminal's standard error, in simulated seconds; nothing elsewhere."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -176,7 +206,11 @@ def _progress(label: str, total: float) -> Iterator[Callable[[float], None]]:
         *columns, TimeRemainingColumn(), console=console, transient=True, disable=not console.is_terminal
     ) as bar:
         task = bar.add_task(label, total=total)
-        yield lambda now: bar.update(task, completed=now)
+
+        def show(now: float, label: str | None = None, total: float | None = None) -> None:
+            bar.update(task, completed=now, description=label, total=total)
+
+        yield show
 
 
 def _print(what: object) -> None:

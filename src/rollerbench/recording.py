@@ -30,6 +30,7 @@ ROBOT_COLUMNS: dict[str, str] = {
 WHEEL_COLUMNS: dict[str, str] = {
     "angle": "rad",
     "speed": "rad/s",
+    "measured": "rad/s",
     "command": "rad/s",
     "effort": "N m",
     "swivel": "rad",
@@ -41,7 +42,8 @@ WHEEL_COLUMNS: dict[str, str] = {
 }
 """Columns of each wheel, named wheel.column, and their units.
 
-command and effort are NaN for wheels without a motor. contact_x and contact_y are where the wheel touches the ground,
+speed is the wheel's own, measured what its encoder tells; measured, command and effort are NaN for wheels without a
+motor. contact_x and contact_y are where the wheel touches the ground,
 from Bo along the axes of B turned upright; slip_x and slip_y are the velocity of the wheel's or roller's surface over
 the ground along them; depth is the penetration, negative in the air.
 """

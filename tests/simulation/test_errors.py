@@ -53,7 +53,7 @@ def test_misplaced_wheels_are_misplaced() -> None:
         ({"radius_scale": {"middle": 1.1}}, ["errors.radius_scale.middle", "accepted: left, right, castor, all"]),
         ({"radius_scale": {"left": 0}}, ["errors.radius_scale.left = 0", "greater than 0"]),
         ({"radius_scale": 1.02}, ["errors.radius_scale = 1.02"]),
-        ({"gear": {}}, ["errors.gear", "accepted: center_of_mass"]),
+        ({"gear": {}}, ["errors.gear", "accepted: backlash_deg, center_of_mass"]),
         ({"center_of_mass": [1.0, 0, 0]}, ["errors: the robot cannot be like that", "tips over"]),
     ],
 )

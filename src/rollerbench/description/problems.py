@@ -96,20 +96,21 @@ def _resolve(location: tuple[int | str, ...], model: type[BaseModel]) -> tuple[L
     owners: list[type[BaseModel]] = [model]
     steps: list[str | int] = []
     pending: list[type[BaseModel]] = [model]
+    keyed = False
     for step in location:
         tagged = [m for m in pending if isinstance(step, str) and step in _tags(m)]
         if len(pending) > 1 and tagged:
             pending = tagged
             continue
         steps.append(step)
-        if isinstance(step, str):
+        if keyed:
+            # A key of a mapping, such as a wheel's name: the models are those of its values.
+            keyed = False
+        elif isinstance(step, str):
             owners = pending
-            pending = [
-                found
-                for owner in owners
-                if step in owner.model_fields
-                for found in _models_in(owner.model_fields[step].annotation)
-            ]
+            annotations = [owner.model_fields[step].annotation for owner in owners if step in owner.model_fields]
+            pending = [found for annotation in annotations for found in _models_in(annotation)]
+            keyed = any(get_origin(annotation) is dict for annotation in annotations)
     return tuple(steps), owners
 
 

@@ -63,6 +63,11 @@ class Robot(Part):
         return tuple(wheel for wheel in self.wheels if wheel.steered)
 
     @property
+    def reach(self) -> float:
+        """Radius of a vertical cylinder about Bo that holds all wheels [m], whichever way they swivel."""
+        return max(float(np.hypot(*wheel.p_BoHo_B[:2])) + wheel.swivel_offset + wheel.radius for wheel in self.wheels)
+
+    @property
     def ground_height(self) -> float:
         """Height of level ground from Bo [m], negative: where the lowest wheel touches it."""
         return float(min(wheel.center_B[2] - wheel.radius for wheel in self.wheels))

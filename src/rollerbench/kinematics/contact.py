@@ -1,17 +1,20 @@
-"""Where the wheels of a moving robot touch level ground, and how fast they slip there.
+"""Where the wheels of a moving robot touch level ground or bumps on it, and how fast they slip there.
 
 Tyres and rollers are ellipsoids of revolution: semi-axis a along a unit vector u, r across. The depth of their lowest
-point below the centre is h = sqrt(r^2 + (a^2 - r^2) u_z^2), and it lies at -(r^2 z + (a^2 - r^2) u_z u) / h.
+point below the centre is h = sqrt(r^2 + (a^2 - r^2) u_z^2), and it lies at -(r^2 z + (a^2 - r^2) u_z u) / h. A sphere
+presses in by its radius less the distance of its centre from the ellipsoid.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
 from rollerbench.description import AnyWheel, Robot
 from rollerbench.description.rollers import rotate_about_axle
+from rollerbench.kinematics.bumps import Bumps, nearest_on_ellipsoid
 
 Array = NDArray[np.float64]
 
@@ -61,61 +64,145 @@ class WheelContact:
     """The deepest contact of one wheel with the ground, over n samples.
 
     Attributes:
-        p_WC: Contact points (n, 3) at the height of the ground [m].
+        p_WC: Contact points (n, 3) on the ground or bump [m].
+        normal_W: Unit normals (n, 3) of the ground or bump there.
         depth: Penetrations (n,) [m], negative where the wheel is in the air.
-        slip_W: Velocities (n, 3) of the wheel's or roller's surface over the ground [m/s].
+        slip_W: Velocities (n, 3) of the wheel's or roller's surface over the ground, along it [m/s].
         roller: Index (n,) of the roller that touches; 0 for a tyre.
     """
 
     p_WC: Array
+    normal_W: Array
     depth: Array
     slip_W: Array
     roller: NDArray[np.intp]
 
 
-def wheel_contact(robot: Robot, wheel: AnyWheel, motion: RobotMotion) -> WheelContact:
-    """The deepest contact of a wheel with level ground at z = 0."""
+def wheel_contact(robot: Robot, wheel: AnyWheel, motion: RobotMotion, bumps: Bumps | None = None) -> WheelContact:
+    """The deepest contact of a wheel with level ground at z = 0, and with bumps on it."""
+    p_WH, v_WH, w_WH = _hub_motion(robot, wheel, motion)
+    shapes = _moving_ellipsoids(robot, wheel, motion, p_WH)
+    places = _on_level_ground(shapes)
+    if bumps is not None and len(bumps.radii):
+        _deepen(places, shapes, bumps, p_WH, reach=float(np.hypot(wheel.radius, wheel.width)))
+
+    p_WC, normal_W = places.p_WC, places.normal_W
+    velocity = v_WH + np.cross(w_WH, p_WC - p_WH)
+    if wheel.name in motion.roller_speeds:
+        touching = (np.arange(len(p_WC)), places.shape)
+        spin = motion.roller_speeds[wheel.name][touching][:, np.newaxis]
+        velocity += spin * np.cross(shapes.axes_W[touching], p_WC - shapes.centers_W[touching])
+    slip = velocity - np.sum(velocity * normal_W, axis=1, keepdims=True) * normal_W
+    return WheelContact(p_WC=p_WC, normal_W=normal_W, depth=places.depth, slip_W=slip, roller=places.shape)
+
+
+@dataclass(frozen=True, slots=True)
+class _Ellipsoids:
+    """k ellipsoids of revolution over n samples: semi-axes, centres (n, k, 3) and axes (n, k, 3) in W."""
+
+    a: float
+    r: float
+    centers_W: Array
+    axes_W: Array
+
+    @property
+    def drops(self) -> Array:
+        """Heights (n, k) of the centres above their lowest points [m]."""
+        drops: Array = np.sqrt(self.r**2 + (self.a**2 - self.r**2) * self.axes_W[..., 2] ** 2)
+        return drops
+
+
+@dataclass(frozen=True, slots=True)
+class _Places:
+    """Where the deepest of a wheel's ellipsoids touches, over n samples; see `WheelContact`."""
+
+    p_WC: Array
+    normal_W: Array
+    depth: Array
+    shape: NDArray[np.intp]
+
+
+def _hub_motion(robot: Robot, wheel: AnyWheel, motion: RobotMotion) -> tuple[Array, Array, Array]:
+    """Positions, velocities and angular velocities (n, 3) of a wheel's hub in W."""
     index = robot.wheel_names.index(wheel.name)
-    n = len(motion.p_WB)
     heading = wheel.heading + motion.swivel_angles[:, index]
-    zeros = np.zeros(n)
+    zeros = np.zeros(len(heading))
     forward_B = np.column_stack([np.cos(heading), np.sin(heading), zeros])
     axle_B = np.column_stack([-np.sin(heading), np.cos(heading), zeros])
-
-    # The hub: its centre, rotation and velocities.
-    p_BoHo_B = wheel.p_BoHo_B - wheel.swivel_offset * forward_B
-    r_W = _apply(motion.R_WB, p_BoHo_B)
-    p_WH = motion.p_WB + r_W
-    up_W, axle_W = motion.R_WB[:, :, 2], _apply(motion.R_WB, axle_B)
-    swivel_W = motion.swivel_rates[:, index, np.newaxis] * up_W
+    r_W = _apply(motion.R_WB, wheel.p_BoHo_B - wheel.swivel_offset * forward_B)
     arm_W = _apply(motion.R_WB, -wheel.swivel_offset * forward_B)
+    swivel_W = motion.swivel_rates[:, index, np.newaxis] * motion.R_WB[:, :, 2]
     v_WH = motion.v_WB + np.cross(motion.w_WB, r_W) + np.cross(swivel_W, arm_W)
-    w_WH = motion.w_WB + swivel_W + motion.wheel_speeds[:, index, np.newaxis] * axle_W
+    turning_W = motion.wheel_speeds[:, index, np.newaxis] * _apply(motion.R_WB, axle_B)
+    return motion.p_WB + r_W, v_WH, motion.w_WB + swivel_W + turning_W
+
+
+def _moving_ellipsoids(robot: Robot, wheel: AnyWheel, motion: RobotMotion, p_WH: Array) -> _Ellipsoids:
+    """The ellipsoids of a wheel whose hub is at p_WH (n, 3)."""
+    index = robot.wheel_names.index(wheel.name)
+    heading = wheel.heading + motion.swivel_angles[:, index]
     R_WF = motion.R_WB @ Rotation.from_euler("z", heading[:, np.newaxis]).as_matrix()
-
-    # The ellipsoids, all of them: heights only.
     a, r, centers_H, axes_H = _ellipsoids(wheel)
-    angle = motion.wheel_angles[:, index, np.newaxis]
-    centers_F = rotate_about_axle(np.broadcast_to(angle, (n, len(centers_H))), centers_H)
-    axes_F = rotate_about_axle(np.broadcast_to(angle, (n, len(axes_H))), axes_H)
-    up_F = R_WF[:, 2, np.newaxis, :]
-    rise = np.sum(axes_F * up_F, axis=-1)
-    drop = np.sqrt(r**2 + (a**2 - r**2) * rise**2)
-    low = p_WH[:, 2, np.newaxis] + np.sum(centers_F * up_F, axis=-1) - drop
+    angle = np.broadcast_to(motion.wheel_angles[:, index, np.newaxis], (len(heading), len(centers_H)))
+    centers_W = p_WH[:, np.newaxis] + rotate_about_axle(angle, centers_H) @ R_WF.transpose(0, 2, 1)
+    axes_W = rotate_about_axle(angle, axes_H) @ R_WF.transpose(0, 2, 1)
+    return _Ellipsoids(a, r, centers_W, axes_W)
 
-    # The lowest one.
-    k = np.argmin(low, axis=1)
-    rows = np.arange(n)
-    u = _apply(R_WF, axes_F[rows, k])
-    center = p_WH + _apply(R_WF, centers_F[rows, k])
-    rise, drop = rise[rows, k, np.newaxis], drop[rows, k, np.newaxis]
-    p_WC = center - ((a**2 - r**2) * rise * u + r**2 * np.array([0.0, 0.0, 1.0])) / drop
+
+def _on_level_ground(shapes: _Ellipsoids) -> _Places:
+    """Contacts of the lowest ellipsoids with the plane z = 0."""
+    low = shapes.centers_W[..., 2] - shapes.drops
+    lowest = np.argmin(low, axis=1)
+    rows = np.arange(len(lowest))
+    u, drop = shapes.axes_W[rows, lowest], shapes.drops[rows, lowest, np.newaxis]
+    # Above the ground point C lies the lowest point of the ellipsoid.
+    p_WC = shapes.centers_W[rows, lowest] - (shapes.a**2 - shapes.r**2) * u[:, 2:] * u / drop
     p_WC[:, 2] = 0.0
-    slip = v_WH + np.cross(w_WH, p_WC - p_WH)
-    if wheel.name in motion.roller_speeds:
-        spin = motion.roller_speeds[wheel.name][rows, k, np.newaxis]
-        slip += spin * np.cross(u, p_WC - center)
-    return WheelContact(p_WC=p_WC, depth=-low[rows, k], slip_W=slip, roller=k)
+    return _Places(p_WC, np.tile([0.0, 0.0, 1.0], (len(rows), 1)), -low[rows, lowest], lowest)
+
+
+def _deepen(places: _Places, shapes: _Ellipsoids, bumps: Bumps, p_WH: Array, reach: float) -> None:
+    """Replaces contacts with level ground by those with bumps, where these are deeper.
+
+    Args:
+        places: The contacts, to be changed.
+        shapes: Ellipsoids of the wheel.
+        bumps: Bumps.
+        p_WH: Positions (n, 3) of the hub [m].
+        reach: How far the wheel extends from its hub [m].
+    """
+    near = KDTree(bumps.centers_W[:, :2]).query_ball_point(p_WH[:, :2], reach + bumps.half_widths.max())
+    sample = np.repeat(np.arange(len(p_WH)), [len(found) for found in near])
+    bump = np.concatenate([np.asarray(found, np.intp) for found in near])
+    # A bump lies below its top, so an ellipsoid may press it deeper than the ground only if it is as low as this.
+    low = shapes.centers_W[..., 2] - shapes.drops
+    pair, shape = np.nonzero(low[sample] < bumps.heights[bump, np.newaxis] - places.depth[sample, np.newaxis])
+    sample, bump = sample[pair], bump[pair]
+    depth, p_WC, normal_W = _on_spheres(shapes, sample, shape, bumps.centers_W[bump], bumps.radii[bump])
+
+    order = np.lexsort((depth, sample))
+    deepest = order[np.flatnonzero(np.diff(sample[order], append=-1))]
+    deepest = deepest[depth[deepest] > places.depth[sample[deepest]]]
+    at = sample[deepest]
+    places.depth[at], places.shape[at] = depth[deepest], shape[deepest]
+    places.p_WC[at], places.normal_W[at] = p_WC[deepest], normal_W[deepest]
+
+
+def _on_spheres(
+    shapes: _Ellipsoids, sample: NDArray[np.intp], shape: NDArray[np.intp], sphere_centers_W: Array, radii: Array
+) -> tuple[Array, Array, Array]:
+    """Depths (m,), contact points (m, 3) on the spheres and their normals (m, 3) there, of m pairs."""
+    center, u = shapes.centers_W[sample, shape], shapes.axes_W[sample, shape]
+    to_sphere = sphere_centers_W - center
+    along = np.sum(to_sphere * u, axis=1)
+    side = to_sphere - along[:, np.newaxis] * u
+    across = np.linalg.norm(side, axis=1)
+    near_along, near_across = nearest_on_ellipsoid(shapes.a, shapes.r, along, across)
+    share = near_across / np.maximum(across, np.finfo(float).tiny)
+    outward = near_along[:, np.newaxis] * u + share[:, np.newaxis] * side - to_sphere
+    distance = np.linalg.norm(outward, axis=1)
+    normal = outward / distance[:, np.newaxis]
+    return radii - distance, sphere_centers_W + radii[:, np.newaxis] * normal, normal
 
 
 def _ellipsoids(wheel: AnyWheel) -> tuple[float, float, Array, Array]:

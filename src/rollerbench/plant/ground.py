@@ -3,17 +3,25 @@
 import logging
 import math
 
-from pydrake.geometry import AddContactMaterial, HalfSpace, ProximityProperties
+from pydrake.geometry import AddContactMaterial, HalfSpace, ProximityProperties, Sphere
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
+from pydrake.multibody.tree import RigidBody, SpatialInertia
 
 from rollerbench.errors import SimulationError
+from rollerbench.kinematics.bumps import Bumps
 
 RIGID = 1e12
 """Stiffness of ground that does not give [N/m]: the wheels' own stiffness then decides."""
 
 
-def add_ground(plant: MultibodyPlant, *, friction: float = 0.8, slope_deg: float = 0.0) -> None:
+BUMPS = "ground_bumps"
+"""Name of the body that carries the ground's bumps."""
+
+
+def add_ground(
+    plant: MultibodyPlant, *, friction: float = 0.8, slope_deg: float = 0.0, bumps: Bumps | None = None
+) -> RigidBody | None:
     """Registers level, rigid ground at z = 0 of the world with a plant that is not finalized.
 
     A slope tilts gravity instead of the ground: x points uphill.
@@ -22,6 +30,10 @@ def add_ground(plant: MultibodyPlant, *, friction: float = 0.8, slope_deg: float
         plant: The plant, connected to a scene graph.
         friction: Coefficient of friction of the ground; with a wheel's it combines to 2ab/(a+b).
         slope_deg: Inclination along x [deg].
+        bumps: What rises above the plane.
+
+    Returns:
+        The body that carries the bumps, if there are any.
     """
     if not plant.geometry_source_is_registered():
         raise SimulationError("add_ground: the plant has no scene graph; accepted: AddMultibodyPlantSceneGraph")
@@ -33,6 +45,17 @@ def add_ground(plant: MultibodyPlant, *, friction: float = 0.8, slope_deg: float
         slope = math.radians(slope_deg)
         strength = plant.gravity_field().gravity_vector()[2]
         plant.mutable_gravity_field().set_gravity_vector([strength * math.sin(slope), 0.0, strength * math.cos(slope)])
+    return _add_bumps(plant, bumps, properties) if bumps is not None and len(bumps.radii) else None
+
+
+def _add_bumps(plant: MultibodyPlant, bumps: Bumps, properties: ProximityProperties) -> RigidBody:
+    # A body of their own, welded to the world: as geometry of the world they would share a search tree with the half
+    # space, and Drake (FCL) crashes when it balances one that holds an infinite box.
+    body = plant.AddRigidBody(BUMPS, plant.AddModelInstance(BUMPS), SpatialInertia.Zero())
+    plant.WeldFrames(plant.world_frame(), body.body_frame())
+    for index, (center, radius) in enumerate(zip(bumps.centers_W, bumps.radii, strict=True)):
+        plant.RegisterCollisionGeometry(body, RigidTransform(center), Sphere(radius), f"bump_{index}", properties)
+    return body
 
 
 def _not_about_deformables(record: logging.LogRecord) -> bool:

@@ -92,6 +92,13 @@ class RobotModel:
             matrix[row, offset + self.velocity_index(self.drive_joint(wheel))] = 1.0
         return matrix
 
+    def wheel_angle_matrix(self) -> NDArray[np.float64]:
+        """Matrix (n_driven, nq + nv) from the robot's state [q; v] to the angles of its driven wheels."""
+        matrix = np.zeros((len(self.robot.driven_wheels), self.plant.num_multibody_states(self.model_instance)))
+        for row, wheel in enumerate(self.robot.driven_wheels):
+            matrix[row, self.position_index(self.drive_joint(wheel))] = 1.0
+        return matrix
+
     def body_state_matrix(self) -> NDArray[np.float64]:
         """Matrix (13, nq + nv) from the robot's state to its body's [quaternion, p_WB, w_WB_W, v_WB_W]."""
         plant, instance = self.plant, self.model_instance

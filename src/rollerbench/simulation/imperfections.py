@@ -1,15 +1,103 @@
 """What differs from robot.yaml in the simulated robot; the controller keeps believing robot.yaml."""
 
+import math
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import Annotated, Any, Self
 
-from pydantic import Field
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
 
 from rollerbench.description import Robot
 from rollerbench.description.files import validate
-from rollerbench.description.part import Number, Part, Positive, Vector3
+from rollerbench.description.part import NonNegative, Number, Part, Positive, PositiveInt, Vector3
 from rollerbench.description.problems import Problem
 from rollerbench.errors import DescriptionError
+from rollerbench.kinematics.bumps import Bumps, scattered_caps
+from rollerbench.kinematics.drivetrain import WheelDrive
+
+OF_THE_ROBOT = ("radius_scale", "position_offset", "heading_offset_deg", "friction", "center_of_mass")
+"""Fields of `Errors` that change the robot's description."""
+
+OF_THE_DRIVETRAIN = ("gear_error", "backlash_deg", "encoder_counts")
+"""Fields of `Errors` that driven wheels have."""
+
+LARGEST_GEAR_ERROR = 0.5
+LARGEST_BACKLASH_DEG = 90.0
+MOST_COUNTS = 10**7
+MOST_BUMPS = 2000
+"""The time of a plant's step grows with their square where they lie close together: 0.2 s for a thousand on 0.5 m2."""
+
+LOW_BUMP = 0.25
+"""Largest height of a bump over the radius of the smallest wheel [-]."""
+
+
+class GearError(Part):
+    """Relative error eps of a gear: true wheel speed is (1 + eps) times motor speed times the described gear_ratio.
+
+    eps = constant + amplitude sin(cycles s + phase), s the motor's angle from the start times the described gear_ratio.
+
+    Attributes:
+        constant: Mean error [-].
+        amplitude: Amplitude of its wave [-].
+        cycles: Periods of the wave in one turn of the wheel [-].
+        phase_deg: Phase of the wave at the start [deg].
+    """
+
+    constant: Number = 0.0
+    amplitude: Number = 0.0
+    cycles: Annotated[Positive, Field(le=1000)] = 1.0
+    phase_deg: Number = 0.0
+
+    @model_validator(mode="after")
+    def _stays_small(self) -> Self:
+        if abs(self.constant) + abs(self.amplitude) > LARGEST_GEAR_ERROR:
+            raise ValueError(
+                f"constant = {self.constant:g}, amplitude = {self.amplitude:g}: "
+                f"accepted: sizes that add up to at most {LARGEST_GEAR_ERROR:g}"
+            )
+        return self
+
+
+class GroundBumps(Part):
+    """Uneven ground: spherical caps at places and of heights that follow from the scenario's seed.
+
+    Attributes:
+        height: Largest height [m]; heights are uniform in (0, height].
+        width: Width of every cap's base [m]. No cap is within a width of where a wheel stands at the start.
+        density: Caps per area [1/m2], around the reference path.
+    """
+
+    height: Positive
+    width: Positive
+    density: Positive
+
+    @model_validator(mode="after")
+    def _is_flat(self) -> Self:
+        if self.height >= 0.5 * self.width:
+            raise ValueError(f"height = {self.height:g}: accepted: less than half of width = {self.width:g}")
+        return self
+
+    def scattered(self, robot: Robot, q_xyt: NDArray[np.float64], seed: int) -> Bumps:
+        """The bumps in the bounding box of reference poses (n, 3), widened by the robot's reach.
+
+        Raises:
+            DescriptionError: there would be too many.
+        """
+        low, high = q_xyt[:, :2].min(axis=0) - robot.reach, q_xyt[:, :2].max(axis=0) + robot.reach
+        area = float(np.prod(high - low))
+        count = round(self.density * area)
+        if count > MOST_BUMPS:
+            message = (
+                f"that makes {count} bumps on the {area:.4g} m2 around the reference path; "
+                f"accepted: up to {MOST_BUMPS}, so at most {MOST_BUMPS / area:.4g} per m2"
+            )
+            raise DescriptionError(str(Problem(("errors", "ground_bumps", "density"), message, self.density)))
+        # Where the wheels stand at the start: the first reference pose is the origin.
+        standing = robot.contact_points_B[:, :2]
+        return scattered_caps(
+            low, high, count=count, height=self.height, width=self.width, clear_of=standing, seed=seed
+        )
 
 
 class Errors(Part):
@@ -21,6 +109,11 @@ class Errors(Part):
         heading_offset_deg: True minus described heading of wheels [deg].
         friction: True coefficient of friction of wheels [-].
         center_of_mass: True minus described centre of mass of the body [m].
+        gear_error: Relative errors of the gear ratios of driven wheels.
+        backlash_deg: Play between motor and driven wheel, seen at the wheel [deg]; a run starts in the middle of it.
+        encoder_counts: Counts in one turn of a driven wheel of the encoder on its motor; without it speeds are
+            measured continuously.
+        ground_bumps: What rises above the level ground.
     """
 
     radius_scale: dict[str, Positive] = Field(default_factory=dict)
@@ -28,23 +121,52 @@ class Errors(Part):
     heading_offset_deg: dict[str, Number] = Field(default_factory=dict)
     friction: dict[str, Positive] = Field(default_factory=dict)
     center_of_mass: Vector3 = (0.0, 0.0, 0.0)
+    gear_error: dict[str, GearError] = Field(default_factory=dict)
+    backlash_deg: dict[str, Annotated[NonNegative, Field(le=LARGEST_BACKLASH_DEG)]] = Field(default_factory=dict)
+    encoder_counts: dict[str, Annotated[PositiveInt, Field(le=MOST_COUNTS)]] = Field(default_factory=dict)
+    ground_bumps: GroundBumps | None = None
 
     def problems(self, robot: Robot) -> Iterator[Problem]:
-        """Names that are no wheels of the robot."""
-        accepted = [*robot.wheel_names, "all"]
-        for field in ("radius_scale", "position_offset", "heading_offset_deg", "friction"):
-            for name in getattr(self, field):
-                if name not in accepted:
-                    message = f"not a wheel of {robot.name}; accepted: {', '.join(accepted)}"
+        """Names that are no wheels of the robot, or none with a motor, and bumps too high for it."""
+        driven = [wheel.name for wheel in robot.driven_wheels]
+        for field in (*OF_THE_ROBOT, *OF_THE_DRIVETRAIN):
+            kind, names = ("driven wheel", driven) if field in OF_THE_DRIVETRAIN else ("wheel", robot.wheel_names)
+            value = getattr(self, field)
+            for name in value if isinstance(value, dict) else ():
+                if name not in (*names, "all"):
+                    message = f"not a {kind} of {robot.name}; accepted: {', '.join((*names, 'all'))}"
                     yield Problem(("errors", field, name), message)
+        if self.ground_bumps is not None:
+            limits = [LOW_BUMP * wheel.radius for wheel in robot.wheels]
+            limits += [wheel.ring.roller_radius for wheel in robot.wheels if wheel.ring is not None]
+            if self.ground_bumps.height > min(limits):
+                message = f"too high for the wheels of {robot.name}; accepted: up to {min(limits):.4g}"
+                yield Problem(("errors", "ground_bumps", "height"), message, self.ground_bumps.height)
+
+    def drives(self, robot: Robot) -> list[WheelDrive] | None:
+        """Drivetrains of the driven wheels, in the order of robot.yaml; None if all are perfect."""
+        drives = []
+        for wheel in robot.driven_wheels:
+            gear = _of(self.gear_error, wheel.name, GearError())
+            drives.append(
+                WheelDrive(
+                    constant=gear.constant,
+                    amplitude=gear.amplitude,
+                    cycles=gear.cycles,
+                    phase=math.radians(gear.phase_deg),
+                    backlash=math.radians(_of(self.backlash_deg, wheel.name, 0.0)),
+                    counts=_of(self.encoder_counts, wheel.name, None),
+                )
+            )
+        return drives if any(getattr(self, field) for field in OF_THE_DRIVETRAIN) else None
 
     def applied(self, robot: Robot) -> Robot:
-        """The robot as it truly is.
+        """The robot as it truly is, but for its drivetrain, which no robot.yaml describes.
 
         Raises:
             DescriptionError: such a robot cannot stand.
         """
-        if self == Errors():
+        if all(getattr(self, field) == getattr(Errors(), field) for field in OF_THE_ROBOT):
             return robot
         data = robot.model_dump(mode="json", exclude_none=True)
         body = data["body"]

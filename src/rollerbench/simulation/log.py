@@ -5,6 +5,8 @@ from numpy.typing import NDArray
 from pydrake.systems.framework import Context
 from scipy.spatial.transform import Rotation
 
+from rollerbench.description import Robot
+from rollerbench.kinematics.bumps import Bumps
 from rollerbench.kinematics.contact import RobotMotion, wheel_contact
 from rollerbench.kinematics.odometry import accumulate, rotate
 from rollerbench.kinematics.profile import reference_poses
@@ -38,18 +40,18 @@ def recording_of(station: Station, scenario: Scenario, context: Context, metadat
     columns |= _named(("vx", "vy", "wz"), motion.v_xyw_B)
     columns |= _named(("reference_x", "reference_y", "reference_yaw"), reference_poses(reference, time))
     columns |= _named(("reference_vx", "reference_vy", "reference_wz"), reference(time))
-    columns |= _named(("odometry_x", "odometry_y", "odometry_yaw"), _odometry(scenario, motion, data["odometry_q_xyt"]))
+    columns |= _named(("odometry_x", "odometry_y", "odometry_yaw"), _odometry(scenario, motion, data))
     stepping = robot_motion(parts.model, _with_next_velocities(parts.model, data["state"]))
-    columns |= _wheel_columns(parts.model, motion, stepping, data["wheel_speed_command"], data["net_actuation"])
+    columns |= _wheel_columns(parts.model, motion, data)
+    columns |= _contact_columns(parts.model.robot, motion, stepping, scenario.bumps)
     return Recording(columns=columns, wheel_names=scenario.robot.wheel_names, metadata=metadata)
 
 
-def _odometry(scenario: Scenario, motion: RobotMotion, in_the_loop: Array) -> Array:
+def _odometry(scenario: Scenario, motion: RobotMotion, data: dict[str, Array]) -> Array:
     """Poses (n, 3) from measured wheel speeds; where wheels steer on the way, from their measured angles too."""
     if not scenario.motion.steers:
-        return in_the_loop
-    driven = [index for index, wheel in enumerate(scenario.robot.wheels) if wheel.driven]
-    twist = scenario.motion.kinematics.forward_at(motion.wheel_speeds[:, driven], motion.swivel_angles)
+        return data["odometry_q_xyt"]
+    twist = scenario.motion.kinematics.forward_at(data["wheel_speeds"], motion.swivel_angles)
     return accumulate(np.zeros(3), scenario.plant.time_step * twist[:-1])
 
 
@@ -91,25 +93,34 @@ def _with_next_velocities(model: RobotModel, state: Array) -> Array:
     return np.hstack([state[:, :nq], np.vstack([state[1:, nq:], state[-1:, nq:]])])
 
 
-def _wheel_columns(
-    model: RobotModel, motion: RobotMotion, stepping: RobotMotion, command: Array, effort: Array
-) -> dict[str, Array]:
-    robot, yaw = model.robot, motion.q_xyt[:, 2]
+def _wheel_columns(model: RobotModel, motion: RobotMotion, data: dict[str, Array]) -> dict[str, Array]:
+    robot = model.robot
     driven = [wheel.name for wheel in robot.driven_wheels]
     actuated = [actuator.joint().name() for actuator in model.actuators]
-    missing = np.full(len(yaw), np.nan)
+    missing = np.full(len(motion.p_WB), np.nan)
     columns: dict[str, Array] = {}
     for index, wheel in enumerate(robot.wheels):
-        contact = wheel_contact(robot, wheel, stepping)
-        place = rotate(-yaw, contact.p_WC[:, :2] - motion.p_WB[:, :2])
-        slip = rotate(-yaw, contact.slip_W[:, :2])
         joint = model.drive_joint(wheel).name()
         values = {
             "angle": motion.wheel_angles[:, index],
             "speed": motion.wheel_speeds[:, index],
-            "command": command[:, driven.index(wheel.name)] if wheel.driven else missing,
-            "effort": effort[:, actuated.index(joint)] if wheel.driven else missing,
+            "measured": data["wheel_speeds"][:, driven.index(wheel.name)] if wheel.driven else missing,
+            "command": data["wheel_speed_command"][:, driven.index(wheel.name)] if wheel.driven else missing,
+            "effort": data["net_actuation"][:, actuated.index(joint)] if wheel.driven else missing,
             "swivel": motion.swivel_angles[:, index],
+        }
+        columns |= {f"{wheel.name}.{name}": value for name, value in values.items()}
+    return columns
+
+
+def _contact_columns(robot: Robot, motion: RobotMotion, stepping: RobotMotion, bumps: Bumps | None) -> dict[str, Array]:
+    yaw = motion.q_xyt[:, 2]
+    columns: dict[str, Array] = {}
+    for wheel in robot.wheels:
+        contact = wheel_contact(robot, wheel, stepping, bumps)
+        place = rotate(-yaw, contact.p_WC[:, :2] - motion.p_WB[:, :2])
+        slip = rotate(-yaw, contact.slip_W[:, :2])
+        values = {
             "contact_x": place[:, 0],
             "contact_y": place[:, 1],
             "depth": contact.depth,

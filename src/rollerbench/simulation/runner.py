@@ -40,11 +40,13 @@ class RunResult:
     """What came out of a run.
 
     Attributes:
+        scenario: What was simulated.
         recording: Samples over time.
         summary: The content of summary.json.
         folder: The run folder; None if nothing was written.
     """
 
+    scenario: Scenario
     recording: Recording
     summary: Mapping[str, Any]
     folder: Path | None
@@ -119,7 +121,7 @@ def run(
     summary = summarize(scenario, recording, wall_time=wall_time, failure=failure)
     if folder is not None:
         write_folder(folder, scenario, recording, summary, page)
-    result = RunResult(recording=recording, summary=summary, folder=folder)
+    result = RunResult(scenario=scenario, recording=recording, summary=summary, folder=folder)
     if failure is not None:
         raise SimulationError(f"{scenario.name}: {failure}", result)
     return result

@@ -7,6 +7,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
+import numpy as np
 from pydantic import BeforeValidator, ConfigDict, Field, ValidationInfo, model_validator
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
@@ -17,7 +18,9 @@ from rollerbench.description.part import Flag, Name, Number, Part, Positive
 from rollerbench.description.problems import Problem, refuse
 from rollerbench.errors import DescriptionError, RollerbenchError
 from rollerbench.kinematics import WheelKinematics
+from rollerbench.kinematics.bumps import Bumps
 from rollerbench.kinematics.motion import Motion, twist_motion, wheel_motion
+from rollerbench.kinematics.profile import reference_poses
 from rollerbench.plant.servo import DRIVE_TIME_CONSTANT
 from rollerbench.resources import scenario_file
 from rollerbench.simulation.commands import Command, WheelSpeedsCommand
@@ -154,6 +157,19 @@ class Scenario(Part):
             DescriptionError: such a robot cannot stand.
         """
         return self.errors.applied(self.robot)
+
+    @cached_property
+    def bumps(self) -> Bumps | None:
+        """What rises above the level ground.
+
+        Raises:
+            DescriptionError: there would be too many bumps, or the command cannot be followed (see `motion`).
+        """
+        if self.errors.ground_bumps is None:
+            return None
+        times = np.arange(0.0, self.duration, self.plant.time_step)
+        path = reference_poses(self.motion.twist, times)
+        return self.errors.ground_bumps.scattered(self.simulated_robot, path, self.seed)
 
     @cached_property
     def motion(self) -> Motion:

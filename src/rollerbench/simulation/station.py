@@ -24,8 +24,8 @@ from rollerbench.plant import RobotModel, add_ground, add_robot, servo_gains
 from rollerbench.simulation.commands import WheelSpeedsCommand
 from rollerbench.simulation.drake_config import plant_config
 from rollerbench.simulation.scenario import Scenario, load_scenario
-from rollerbench.systems import InverseKinematics, Odometry, PlanarState
-from rollerbench.visualization.scene import add_ground_visual, add_meshcat
+from rollerbench.systems import Drivetrain, InverseKinematics, Odometry, PlanarState
+from rollerbench.visualization.scene import add_bump_visuals, add_ground_visual, add_meshcat
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,9 +55,9 @@ class Station(Diagram):
         q_xyt (3): pose of B in W, yaw in (-pi, pi] [m, m, rad].
         v_xyw_B (3): twist in B turned upright [m/s, m/s, rad/s].
         wheel_speed_command (n_driven): commanded wheel speeds [rad/s].
-        wheel_speeds (n_driven): measured wheel speeds [rad/s].
+        wheel_speeds (n_driven): wheel speeds that the encoders measure [rad/s].
         net_actuation (n_actuators): torques of the servos [N m].
-        odometry_q_xyt (3): pose from the measured wheel speeds [m, m, rad].
+        odometry_q_xyt (3): pose from these measured wheel speeds [m, m, rad].
         contact_results: Drake's ContactResults.
         query_object: Drake's QueryObject.
 
@@ -92,23 +92,20 @@ class Station(Diagram):
         plant, scene_graph = _add_plant(builder, scenario)
         gains = servo_gains(scenario.robot, time_constant=scenario.controller.servo_time_constant)
         model = add_robot(plant, scenario.simulated_robot, gains=gains)
-        add_ground(plant, friction=scenario.ground.friction, slope_deg=scenario.ground.slope_deg)
-        if meshcat is not None:
-            add_ground_visual(plant, scenario.simulated_robot)
+        _add_ground(plant, scenario, drawn=meshcat is not None)
         plant.Finalize()
 
         command_port = _add_command(builder, scenario, external=command == "external")
-        _connect_servo(builder, scenario, model, command_port, external=command == "external")
+        servo_port, measured_port = _add_drivetrain(builder, scenario, model, command_port)
+        _connect_servo(builder, scenario, model, servo_port, external=command == "external")
         outputs = {
             "state": plant.get_state_output_port(model.model_instance),
             "wheel_speed_command": command_port,
+            "wheel_speeds": measured_port,
             "net_actuation": plant.get_net_actuation_output_port(model.model_instance),
             "contact_results": plant.get_contact_results_output_port(),
             "query_object": scene_graph.get_query_output_port(),
         }
-        speeds = builder.AddNamedSystem("wheel_speed_sensor", MatrixGain(model.wheel_speed_matrix()))
-        builder.Connect(outputs["state"], speeds.get_input_port())
-        outputs["wheel_speeds"] = speeds.get_output_port()
         body = builder.AddNamedSystem("body_state", MatrixGain(model.body_state_matrix()))
         builder.Connect(outputs["state"], body.get_input_port())
         planar = builder.AddNamedSystem("planar_state", PlanarState())
@@ -122,7 +119,7 @@ class Station(Diagram):
 
         logs = {}
         if log:
-            for name in ("state", "wheel_speed_command", "net_actuation", "odometry_q_xyt"):
+            for name in ("state", "wheel_speed_command", "wheel_speeds", "net_actuation", "odometry_q_xyt"):
                 logs[name] = LogVectorOutput(outputs[name], builder, publish_period=scenario.plant.time_step)
         if meshcat is not None:
             add_meshcat(builder, scene_graph, meshcat, scenario.recording.frames_per_second)
@@ -148,6 +145,15 @@ def _add_plant(builder: DiagramBuilder, scenario: Scenario) -> tuple[MultibodyPl
         raise DescriptionError(f"plant: Drake refuses these settings: {error}") from error
 
 
+def _add_ground(plant: MultibodyPlant, scenario: Scenario, *, drawn: bool) -> None:
+    bumps, ground = scenario.bumps, scenario.ground
+    carrier = add_ground(plant, friction=ground.friction, slope_deg=ground.slope_deg, bumps=bumps)
+    if drawn:
+        add_ground_visual(plant, scenario.simulated_robot)
+        if bumps is not None and carrier is not None:
+            add_bump_visuals(plant, carrier, bumps)
+
+
 def _add_command(builder: DiagramBuilder, scenario: Scenario, *, external: bool) -> OutputPort:
     """The output port of the commanded wheel speeds."""
     motion = scenario.motion
@@ -160,6 +166,24 @@ def _add_command(builder: DiagramBuilder, scenario: Scenario, *, external: bool)
         twist = builder.AddNamedSystem("twist_command", _source(motion.twist))
         builder.Connect(twist.get_output_port(), kinematics.GetInputPort("v_xyw_B"))
     return kinematics.GetOutputPort("wheel_speeds")
+
+
+def _add_drivetrain(
+    builder: DiagramBuilder, scenario: Scenario, model: RobotModel, command_port: OutputPort
+) -> tuple[OutputPort, OutputPort]:
+    """The output ports of the wheel speeds for the servos, and of those that are measured."""
+    state = model.plant.get_state_output_port(model.model_instance)
+    speeds = builder.AddNamedSystem("wheel_speed_sensor", MatrixGain(model.wheel_speed_matrix()))
+    builder.Connect(state, speeds.get_input_port())
+    drives = scenario.errors.drives(scenario.robot)
+    if drives is None:
+        return command_port, speeds.get_output_port()
+    angles = builder.AddNamedSystem("wheel_angle_sensor", MatrixGain(model.wheel_angle_matrix()))
+    builder.Connect(state, angles.get_input_port())
+    drivetrain = builder.AddNamedSystem("drivetrain", Drivetrain(drives, scenario.plant.time_step))
+    builder.Connect(command_port, drivetrain.GetInputPort("wheel_speed_command"))
+    builder.Connect(angles.get_output_port(), drivetrain.GetInputPort("wheel_angles"))
+    return drivetrain.GetOutputPort("servo_wheel_speeds"), drivetrain.GetOutputPort("measured_wheel_speeds")
 
 
 def _connect_servo(

@@ -5,17 +5,29 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.geometry import Box, Meshcat, MeshcatParams, MeshcatVisualizer, MeshcatVisualizerParams, Rgba, SceneGraph
+from pydrake.geometry import (
+    Box,
+    Ellipsoid,
+    Meshcat,
+    MeshcatParams,
+    MeshcatVisualizer,
+    MeshcatVisualizerParams,
+    Rgba,
+    SceneGraph,
+)
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import RigidBody
 from pydrake.systems.framework import DiagramBuilder
 
 from rollerbench.description import Robot
+from rollerbench.kinematics.bumps import Bumps
 
 GROUND_SIZE = 40
 """Side of the ground that is shown, over the size of the robot [-]."""
 
 GROUND_COLOR = np.array([0.88, 0.89, 0.90, 1.0])
+BUMP_COLOR = np.array([0.72, 0.66, 0.58, 1.0])
 GRID_COLOR = Rgba(0.55, 0.60, 0.65, 1.0)
 REFERENCE_COLOR = Rgba(0.10, 0.45, 0.85, 1.0)
 SIMULATED_COLOR = Rgba(0.90, 0.45, 0.05, 1.0)
@@ -42,6 +54,17 @@ def add_ground_visual(plant: MultibodyPlant, robot: Robot) -> None:
     slab = Box(side, side, thickness)
     pose = RigidTransform([0.0, 0.0, -0.5 * thickness - 0.001 * size])
     plant.RegisterVisualGeometry(plant.world_body(), pose, slab, "ground", GROUND_COLOR)
+
+
+def add_bump_visuals(plant: MultibodyPlant, body: RigidBody, bumps: Bumps) -> None:
+    """Draws bumps on the body that carries them, in a plant that is not finalized.
+
+    As flat ellipsoids of their heights and widths: Meshcat's spheres are too coarse to show a small cap of a large one.
+    """
+    places = zip(bumps.centers_W, bumps.half_widths, bumps.heights, strict=True)
+    for index, ((x, y, _), half_width, height) in enumerate(places):
+        shape = Ellipsoid(half_width, half_width, height)
+        plant.RegisterVisualGeometry(body, RigidTransform([x, y, 0.0]), shape, f"bump_{index}", BUMP_COLOR)
 
 
 def add_meshcat(
@@ -98,5 +121,4 @@ def _draw_grid(meshcat: Meshcat, size: float) -> None:
 
 def _size(robot: Robot) -> float:
     """Largest horizontal extent of the robot [m]."""
-    reach = max(math.hypot(*wheel.p_BoHo_B[:2]) + wheel.swivel_offset + wheel.radius for wheel in robot.wheels)
-    return max(2 * reach, *robot.body.size[:2])
+    return max(2 * robot.reach, *robot.body.size[:2])

@@ -1,0 +1,77 @@
+"""What all figures share: colours, axes, curves, SVG text."""
+
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import cycle
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#F0E442")
+"""Distinguishable with colour-blindness: Okabe and Ito (2008)."""
+
+STYLES = ("-", "--", "-.", ":")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Curve:
+    """A line of a figure.
+
+    Attributes:
+        label: Its name in the legend.
+        x: Abscissae (n,).
+        y: Ordinates (n,).
+        style: Matplotlib's format, such as "--" or "o".
+    """
+
+    label: str
+    x: NDArray[np.float64]
+    y: NDArray[np.float64]
+    style: str = "-"
+
+
+def curves(xlabel: str, panels: Mapping[str, Sequence[Curve]], *, equal: bool = False) -> str:
+    """SVG text of panels one below the other, by the label of their ordinate.
+
+    Args:
+        xlabel: Label of the abscissa.
+        panels: Curves of each panel.
+        equal: Whether both axes have one scale, as a map has.
+    """
+    figure, rows = new_figure(len(panels))
+    for axes, (ylabel, lines) in zip(rows, panels.items(), strict=True):
+        for line, color in zip(lines, cycle(COLORS), strict=False):
+            axes.plot(line.x, line.y, line.style, color=color, label=line.label, markersize=4, linewidth=1.3)
+        axes.set_ylabel(ylabel)
+        if len(lines) > 1:
+            axes.legend()
+        if equal:
+            axes.set_aspect("equal", adjustable="datalim")
+        elif np.ptp(np.concatenate([line.y for line in lines])) < 1e-9:
+            # A constant is drawn as one, not as the noise of its last digits.
+            axes.set_ylim(float(lines[0].y[0]) - 1.0, float(lines[0].y[0]) + 1.0)
+    rows[-1].set_xlabel(xlabel)
+    return svg_text(figure)
+
+
+def new_figure(rows: int) -> tuple[Figure, list[Axes]]:
+    """A figure with panels one below the other, on a light grid."""
+    figure = Figure(figsize=(7.0, 2.6 * rows + 1.2), layout="constrained")
+    axes = [figure.add_subplot(rows, 1, row + 1) for row in range(rows)]
+    for each in axes:
+        each.grid(visible=True, color="0.9")
+        each.set_axisbelow(True)
+    return figure, axes
+
+
+def svg_text(figure: Figure) -> str:
+    """The figure as SVG, the same text for the same figure."""
+    stream = io.StringIO()
+    # A fixed salt and no date: the same run gives the same file.
+    with mpl.rc_context({"svg.hashsalt": "rollerbench", "svg.fonttype": "path"}):
+        figure.savefig(stream, format="svg", metadata={"Date": None})
+    return stream.getvalue()
