@@ -61,7 +61,7 @@ def test_six_wheel(tmp_path: Path) -> None:
     numbers = {9, 10, 11, 12, 13, 14, 15, 17}
     assert {p.name for p in done.findings.pictures} == {f"figure_{n:02d}" for n in numbers}
     end = row(done, "Figure 10", "x at 3 s")
-    assert end.theory == pytest.approx(0.42019, abs=1e-5)
+    assert end.theory == pytest.approx(0.420205, abs=1e-6)
     assert end.simulated == pytest.approx(0.4202, abs=2e-4)
     assert row(done, "Figure 10", "x at 1 s").theory == pytest.approx(0.1051, abs=5e-5)
     assert row(done, "Figure 10", "x at 2 s").theory == pytest.approx(0.3152, abs=5e-5)
@@ -77,13 +77,12 @@ def test_six_wheel(tmp_path: Path) -> None:
         result = row(done, item, "range")
         assert result.theory == pytest.approx(printed, rel=0.02)
         assert result.simulated == pytest.approx(printed, rel=0.2)
-    for turn in range(20):
-        result = row(done, "Table 1", f"error of turn {turn + 1}" if turn else "error of turn 1")
+    for result in rows(done, "Table 1", "error of turn"):
         assert result.theory == pytest.approx(result.printed, abs=0.002)
-    mean = row(done, "Table 1", "mean")
-    assert mean.theory == pytest.approx(15.167, abs=5e-4)
-    # The stated imperfections scatter the mark as much as the measured robot's, within a factor of two.
-    assert 0.5 < mean.simulated / mean.theory < 2.0
+    means = rows(done, "Table 1", "mean")
+    assert means[0].theory == pytest.approx(15.167, abs=5e-4)
+    # The uneven floor scatters the mark as the experiment did, but for its two leaps: within a factor of 1.5.
+    assert means[1].simulated == pytest.approx(means[1].theory, rel=0.5)
     assert row(done, "Table 1", "drift").theory == pytest.approx(125.2, abs=0.05)
     spread, expected, _ = proof(done, "Equations (8) and (9)")
     assert spread == pytest.approx(expected)

@@ -72,14 +72,20 @@ def _table_1(runs: Mapping[str, RunResult]) -> list[Result]:
 
 
 def _figure_6(runs: Mapping[str, RunResult]) -> tuple[list[Result], list[Picture]]:
-    results, lines = [], []
-    for motion, (name, velocity, _) in TABLE_1.items():
-        recording = runs[name].recording
-        end, theory = recording.q_xyt[-1], recording.reference_q_xyt[-1]
+    """Where the printed wheel speeds lead: by forward kinematics, and in the simulation."""
+    results, paths, turns = [], [], []
+    for motion, (name, velocity, printed) in TABLE_1.items():
+        run, recording = runs[name], runs[name].recording
+        kinematics = WheelKinematics(run.scenario.robot)
+        wheels = dict(zip(WHEELS, printed, strict=True))
+        twist = kinematics.forward([wheels[wheel] for wheel in recording.wheel_names])
+        # Each ramp counts half.
+        theory = integrate(np.zeros(3), twist, run.scenario.duration - run.scenario.command.model_dump()["ramp"])
+        end = recording.q_xyt[-1]
         if velocity[2]:
-            quantity, unit, scale, index = "yaw at the end", "deg", math.degrees(1.0), 2
-            results.append(Result(item=f"Figure 6, {motion}", quantity=quantity, unit=unit,
-                                  theory=scale * theory[index], simulated=scale * end[index]))  # fmt: skip
+            results.append(Result(item=f"Figure 6, {motion}", quantity="yaw at the end", unit="deg",
+                                  theory=math.degrees(theory[2]), simulated=math.degrees(end[2])))  # fmt: skip
+            turns.append(Curve(label=motion, x=recording.time, y=np.degrees(recording.q_xyt[:, 2])))
             continue
         direction = theory[:2] / np.hypot(*theory[:2])
         aside = np.array([-direction[1], direction[0]])
@@ -90,13 +96,26 @@ def _figure_6(runs: Mapping[str, RunResult]) -> tuple[list[Result], list[Picture
                    theory=0.0, simulated=float(1e3 * end[:2] @ aside)),
         ]  # fmt: skip
         # The paper's axes: X right, Y forward.
-        lines.append(Curve(label=motion, x=-recording.q_xyt[:, 1], y=recording.q_xyt[:, 0]))
+        paths.append(Curve(label=motion, x=-recording.q_xyt[:, 1], y=recording.q_xyt[:, 0]))
     caption = (
         "Paths of the eight translations in the paper's axes, X right and Y forward. Sideways and diagonal paths fall "
         "short by 1.2 and 0.6 %: wheels with twelve rollers are not textbook wheels (see mecanum_platform/README.md)."
     )
-    svg = curves("X [m]", {"Y [m]": lines}, equal=True)
-    return results, [Picture(name="figure_06", title="Figure 6.", caption=caption, svg=svg)]
+    pictures = [
+        Picture(
+            name="figure_06",
+            title="Figure 6.",
+            caption=caption,
+            svg=curves("X [m]", {"Y [m]": paths}, equal=True),
+        ),
+        Picture(
+            name="figure_06_turns",
+            title="Figure 6, the turns.",
+            caption="Yaw in the two turns on the spot.",
+            svg=curves("time [s]", {"yaw [deg]": turns}),
+        ),
+    ]
+    return results, pictures
 
 
 def _figure_7(run: RunResult) -> tuple[list[Result], list[Picture]]:

@@ -1,7 +1,7 @@
 """Wang et al. (2016): four omni wheels and two tyres. Straight run, pivot, and twenty single turns."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,10 @@ from rollerbench.studies.paper import Findings, Mistake, Paper, Picture, Result
 
 Array = NDArray[np.float64]
 
-STRAIGHT, PIVOT, OFFSET, TURNS = (f"six_wheel_{name}" for name in ("straight", "pivot", "pivot_offset", "twenty_turns"))
+STRAIGHT, PIVOT, OFFSET = (f"six_wheel_{name}" for name in ("straight", "pivot", "pivot_offset"))
+
+TURNS = tuple(f"single_turn_{turn:02d}" for turn in range(1, 21))
+"""The turns of the experiment in table 1."""
 
 LEFT = ("rear_left", "front_left", "middle_left")
 
@@ -37,13 +40,18 @@ TABLE_1_ERRORS = np.array([
 
 
 def scenarios() -> dict[str, Scenario]:
-    """The paper's two ADAMS runs, the pivot with an offset mass, and the turns of its experiment."""
-    return {name: load_scenario(name) for name in (STRAIGHT, PIVOT, OFFSET, TURNS)}
+    """The paper's two ADAMS runs, the pivot with an offset mass, and the twenty turns of its experiment."""
+    chosen = {name: load_scenario(name) for name in (STRAIGHT, PIVOT, OFFSET)}
+    for seed, name in enumerate(TURNS, start=1):
+        overrides = {"name": name, "seed": seed, "recording.html": seed == 1}
+        chosen[name] = load_scenario("six_wheel_single_turn", overrides=overrides)
+    return chosen
 
 
 def evaluate(runs: Mapping[str, RunResult]) -> Findings:
     """Figures 9 to 15 and 17, table 1, and the mistakes."""
-    parts = [_straight(runs[STRAIGHT]), _pivot(runs[PIVOT], runs[OFFSET]), _single_turns(runs[TURNS])]
+    turns = _single_turns([runs[name] for name in TURNS])
+    parts = [_straight(runs[STRAIGHT]), _pivot(runs[PIVOT], runs[OFFSET]), turns]
     return Findings(
         results=tuple(result for results, _ in parts for result in results),
         pictures=tuple(picture for _, pictures in parts for picture in pictures),
@@ -163,18 +171,23 @@ def _pivot(centred: RunResult, offset: RunResult) -> tuple[list[Result], list[Pi
     return results, pictures
 
 
-def _single_turns(run: RunResult) -> tuple[list[Result], list[Picture]]:
+def _single_turns(runs: Sequence[RunResult]) -> tuple[list[Result], list[Picture]]:
     recomputed = np.hypot(*np.diff(TABLE_1_POINTS, axis=0).T)
-    marks = simulated_marks(run)
+    marks = simulated_marks(runs)
     errors = np.hypot(*np.diff(marks, axis=0).T)
     results = [
         Result(item="Table 1", quantity=f"error of turn {turn + 1}", unit="mm",
                printed=float(TABLE_1_ERRORS[turn]), theory=float(recomputed[turn]), simulated=float(errors[turn]))
         for turn in range(20)
     ]  # fmt: skip
-    for label, printed, of in (("mean", 15.166, np.mean), ("smallest", 2.299, np.min), ("largest", 57.501, np.max)):
+    for label, printed, of in (
+        ("mean", 15.166, np.mean),
+        ("mean, without turns 2 and 3,", None, lambda all_errors: np.mean(np.delete(all_errors, [1, 2]))),
+        ("smallest", 2.299, np.min),
+        ("largest", 57.501, np.max),
+    ):
         results.append(
-            Result(item="Table 1", quantity=f"{label} error of a turn", unit="mm",
+            Result(item="Table 1", quantity=f"{label} error", unit="mm",
                    printed=printed, theory=float(of(recomputed)), simulated=float(of(errors)))
         )  # fmt: skip
     results.append(
@@ -195,19 +208,23 @@ def _single_turns(run: RunResult) -> tuple[list[Result], list[Picture]]:
         for axis, name in enumerate("XY")
     }
     caption = (
-        "The mark in the middle of the robot after each of 20 single turns, measured by Wang et al. and simulated with "
-        "the imperfections of six_wheel_twenty_turns: uneven ground, gears that run out of true, unequal radii. The "
-        "column theory of table 1 is the distance between the printed coordinates."
+        "The mark in the middle of the robot after each of 20 single turns, measured by Wang et al. and simulated. "
+        "What was imperfect in the experiment is not known; simulated is an uneven floor, another one for each turn, "
+        "with 15 caps a square metre, 80 mm wide and up to 5 mm high, and nothing else. In turns 2 and 3 the measured "
+        "X leaps by -50 and back by +57 mm, as after a disturbance of the target. The column theory of table 1 is the "
+        "distance between the printed coordinates."
     )
     return results, [Picture(name="figure_17", title="Figure 17.", caption=caption, svg=curves("turn", panels))]
 
 
-def simulated_marks(run: RunResult) -> Array:
-    """Places (21, 2) of Bo at rest before the first and after each turn [mm]."""
-    command = run.scenario.command.model_dump()
-    ends = np.cumsum([piece["duration"] for piece in command["pieces"]])[1::2]
-    at = np.concatenate([[0.0], ends])
-    return np.column_stack([1e3 * np.interp(at, run.recording.time, run.recording.columns[name]) for name in "xy"])
+def simulated_marks(runs: Sequence[RunResult]) -> Array:
+    """Places (n + 1, 2) of Bo before the first and after each of n runs, which follow each other [mm]."""
+    pose, marks = np.zeros(3), [np.zeros(2)]
+    for run in runs:
+        end = run.recording.q_xyt[-1]
+        pose = np.array([*(pose[:2] + rotate(pose[2], end[:2])), pose[2] + end[2]])
+        marks.append(1e3 * pose[:2])
+    return np.array(marks)
 
 
 def _mistakes(kinematics: WheelKinematics) -> tuple[Mistake, ...]:
