@@ -9,7 +9,7 @@ import rollerbench as rb
 from rollerbench.kinematics import finite_roller_factor
 from rollerbench.resources import scenario_files
 
-NAMES = [name for name in scenario_files() if name.startswith(("mecanum_", "youbot_"))]
+NAMES = [name for name in scenario_files() if name.startswith(("mecanum_", "youbot_")) and "closed" not in name]
 TRANSLATIONS = [name for name in NAMES if "turn" not in name]
 TURNS = [name for name in NAMES if "turn" in name]
 
