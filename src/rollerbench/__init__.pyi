@@ -1,6 +1,8 @@
 from . import sdf as sdf
 from . import systems as systems
+from .analysis import ErrorBudget as ErrorBudget
 from .analysis import PoseError as PoseError
+from .analysis import error_budget as error_budget
 from .analysis import pose_error as pose_error
 from .description import Body as Body
 from .description import CastorWheel as CastorWheel

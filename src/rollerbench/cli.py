@@ -66,6 +66,13 @@ def run(
         list[str] | None,
         typer.Option("--set", metavar="KEY=VALUE", help="Override a field, such as plant.time_step=0.002."),
     ] = None,
+    engine: Annotated[
+        str | None,
+        typer.Option(help="drake, mujoco, or both: Drake with MuJoCo as a cross-check.", show_default="drake"),
+    ] = None,
+    check_step: Annotated[
+        bool, typer.Option("--check-step", help="Simulate a second time with half the step, and compare.")
+    ] = False,
     live: Annotated[bool, typer.Option("--live", help="Show the run in a browser, in real time.")] = False,
     no_recording: Annotated[
         bool, typer.Option("--no-recording", help="Write no recording.html, which is faster.")
@@ -73,9 +80,11 @@ def run(
 ) -> None:
     """Simulate a scenario, compare it with the equations, and write the run folder."""
     from rollerbench import simulation
-    from rollerbench.report.terminal import summary_table
+    from rollerbench.report.terminal import budget_table, summary_table
 
     overrides = list(set_ or [])
+    overrides += [f"engine={engine}"] if engine is not None else []
+    overrides += ["check_step=true"] if check_step else []
     overrides += ["recording.html=false"] if no_recording else []
     overrides += ["simulator.target_realtime_rate=1.0"] if live else []
     loaded = simulation.load_scenario(scenario, overrides=overrides, robot=robot)
@@ -91,9 +100,11 @@ def run(
     except SimulationError as error:
         if error.result is not None:
             _print(summary_table(error.result.summary))
+            _print(budget_table(error.result.summary))
             _print(f"Kept until then: {error.result.folder}")
         raise
     _print(summary_table(result.summary))
+    _print(budget_table(result.summary))
     _print(f"Written: {result.folder}")
     if live and sys.stdin.isatty():
         input("Press Enter to close the live page. ")
@@ -144,6 +155,33 @@ def build(
         except OSError as error:
             raise RollerbenchError(f"{target}: cannot be written: {error}") from error
         _print(f"{target}")
+
+
+@app.command(epilog="Example: rollerbench export youbot_base --format mjcf -o youbot_base.xml")
+def export(
+    robot: Annotated[str, typer.Argument(help="Name of a shipped robot, or path to a robot.yaml.")],
+    format_: Annotated[str, typer.Option("--format", help="sdf, or mjcf (for MuJoCo).")] = "sdf",
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="File to write.", show_default="standard output")
+    ] = None,
+) -> None:
+    """Write a robot as a model for other simulators."""
+    from rollerbench.description import load_robot
+    from rollerbench.description.files import write_atomically
+    from rollerbench.sdf import robot_to_mjcf, robot_to_sdf
+
+    writers = {"sdf": robot_to_sdf, "mjcf": robot_to_mjcf}
+    if format_ not in writers:
+        raise RollerbenchError(f"--format {format_!r}: accepted: {', '.join(writers)}")
+    text = writers[format_](load_robot(robot))
+    if output is None:
+        print(text, end="")
+        return
+    try:
+        write_atomically(output, text)
+    except OSError as error:
+        raise RollerbenchError(f"{output}: cannot be written: {error}") from error
+    _print(f"{output}")
 
 
 @app.command(epilog="Example: rollerbench schema > robot.schema.json")

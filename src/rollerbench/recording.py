@@ -39,13 +39,19 @@ WHEEL_COLUMNS: dict[str, str] = {
     "depth": "m",
     "slip_x": "m/s",
     "slip_y": "m/s",
+    "drive_x": "-",
+    "drive_y": "-",
+    "rolling_radius": "m",
 }
 """Columns of each wheel, named wheel.column, and their units.
 
 speed is the wheel's own, measured what its encoder tells; measured, command and effort are NaN for wheels without a
-motor. contact_x and contact_y are where the wheel touches the ground,
-from Bo along the axes of B turned upright; slip_x and slip_y are the velocity of the wheel's or roller's surface over
-the ground along them; depth is the penetration, negative in the air.
+motor. contact_x and contact_y are where the wheel touches the ground, from Bo along the axes of B turned upright;
+slip_x and slip_y are the velocity of the wheel's or roller's surface over the ground along them; depth is the
+penetration, negative in the air. With the velocity v_C of the body over the contact, drive = (drive_x, drive_y) along
+these axes and rolling_radius are those of drive . v_C = rolling_radius speed + drive . slip, the equation that the
+wheel really obeys. Velocities at the contact are those of the step that starts with the sample, as the engine finds
+them.
 """
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import rollerbench as rb
+from budgets import assert_parts_add_up
 from rollerbench.kinematics import finite_roller_factor
 from rollerbench.resources import scenario_files
 
@@ -23,6 +24,7 @@ def test_there_are_ten_for_each() -> None:
 def test_translation(name: str) -> None:
     scenario = rb.load_scenario(name)
     result = rb.run(scenario, save=False)
+    assert_parts_add_up(result.recording)
     error, path = result.summary["pose_error"], result.summary["path_length"]
     vx, vy, _ = scenario.command.v_xyw_B
     shortfall = 1 - finite_roller_factor(12)
@@ -43,6 +45,7 @@ def test_translation(name: str) -> None:
 def test_turns_stay_on_the_spot_and_fall_short(name: str) -> None:
     """The wheels contradict each other in a turn, so its shortfall follows friction and servo: no law, a range."""
     result = rb.run(name, save=False)
+    assert_parts_add_up(result.recording)
     error, rotation = result.summary["pose_error"], result.summary["rotation"]
     assert error["max_position"] < 1e-3
     short = -error["final_yaw"] * np.sign(result.recording.reference_q_xyt[-1, 2]) / rotation

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import rollerbench as rb
+from budgets import assert_parts_add_up
 from rollerbench.studies import Reproduction, paper_names, reproduce
 from rollerbench.studies.differential_drive import gear_path, half_track, offset, with_gamma
 from rollerbench.studies.mecanum import TABLE_1, WHEELS, body_twist
@@ -34,6 +35,8 @@ def reproduced(name: str, folder: Path) -> Reproduction:
     for picture in done.findings.pictures:
         assert (folder / name / "figures" / f"{picture.name}.svg").stat().st_size > 1000
         assert f'id="{picture.name}"' in page
+    for run in done.runs.values():
+        assert_parts_add_up(run.recording)
     for link in re.findall(r'href="(runs/[^"]+)"', page):
         assert (folder / name / link).exists()
     return done

@@ -39,7 +39,7 @@ def pose_error(recording: Recording) -> PoseError:
     """Pose error of a recording, at its end and at its worst."""
     error = recording.q_xyt - recording.reference_q_xyt
     distance = np.hypot(error[:, 0], error[:, 1])
-    direction = _last_direction(recording)
+    direction = last_direction(recording)
     ahead, left = np.array([np.cos(direction), np.sin(direction)]), np.array([-np.sin(direction), np.cos(direction)])
     path = path_length(recording)
     return PoseError(
@@ -70,7 +70,7 @@ def _arc_lengths(q_xyt: NDArray[np.float64]) -> NDArray[np.float64]:
     return arcs
 
 
-def _last_direction(recording: Recording) -> float:
+def last_direction(recording: Recording) -> float:
     """Direction of travel of the reference when it last moved, in W [rad]."""
     v, yaw = recording.reference_v_xyw_B, recording.reference_q_xyt[:, 2]
     moving = np.flatnonzero(np.hypot(v[:, 0], v[:, 1]) > STANDSTILL)

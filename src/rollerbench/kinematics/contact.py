@@ -69,6 +69,10 @@ class WheelContact:
         depth: Penetrations (n,) [m], negative where the wheel is in the air.
         slip_W: Velocities (n, 3) of the wheel's or roller's surface over the ground, along it [m/s].
         roller: Index (n,) of the roller that touches; 0 for a tyre.
+        drive_W: Directions (n, 3) d in which the wheel holds the ground, scaled to a part of 1 along its heading: that
+            of the roller's axis, for a tyre the heading.
+        rolling_radius: Lengths (n,) r of the equation that the wheel really obeys [m]: with the velocity v_C of the
+            body's material over the contact, d . v_C = r q' + d . slip.
     """
 
     p_WC: Array
@@ -76,6 +80,8 @@ class WheelContact:
     depth: Array
     slip_W: Array
     roller: NDArray[np.intp]
+    drive_W: Array
+    rolling_radius: Array
 
 
 def wheel_contact(robot: Robot, wheel: AnyWheel, motion: RobotMotion, bumps: Bumps | None = None) -> WheelContact:
@@ -93,7 +99,16 @@ def wheel_contact(robot: Robot, wheel: AnyWheel, motion: RobotMotion, bumps: Bum
         spin = motion.roller_speeds[wheel.name][touching][:, np.newaxis]
         velocity += spin * np.cross(shapes.axes_W[touching], p_WC - shapes.centers_W[touching])
     slip = velocity - np.sum(velocity * normal_W, axis=1, keepdims=True) * normal_W
-    return WheelContact(p_WC=p_WC, normal_W=normal_W, depth=places.depth, slip_W=slip, roller=places.shape)
+    drive_W, rolling_radius = _drive_equation(robot, wheel, motion, shapes, places, p_WC - p_WH)
+    return WheelContact(
+        p_WC=p_WC,
+        normal_W=normal_W,
+        depth=places.depth,
+        slip_W=slip,
+        roller=places.shape,
+        drive_W=drive_W,
+        rolling_radius=rolling_radius,
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,28 +137,49 @@ class _Places:
     shape: NDArray[np.intp]
 
 
+def _drive_equation(
+    robot: Robot, wheel: AnyWheel, motion: RobotMotion, shapes: _Ellipsoids, places: _Places, p_HC_W: Array
+) -> tuple[Array, Array]:
+    """`WheelContact.drive_W` and `WheelContact.rolling_radius`.
+
+    A roller turns about its axis u, so its surface moves across u, and the hub's turn alone moves it along u.
+    """
+    R_WF = _heading_frames(robot, wheel, motion)
+    forward_W, axle_W, normal_W = R_WF[:, :, 0], R_WF[:, :, 1], places.normal_W
+    if wheel.ring is None:
+        along = np.cross(axle_W, normal_W)
+    else:
+        u = shapes.axes_W[np.arange(len(normal_W)), places.shape]
+        along = u - np.sum(u * normal_W, axis=1, keepdims=True) * normal_W
+    drive = along / np.sum(along * forward_W, axis=1, keepdims=True)
+    return drive, -np.sum(np.cross(axle_W, p_HC_W) * drive, axis=1)
+
+
+def _heading_frames(robot: Robot, wheel: AnyWheel, motion: RobotMotion) -> Array:
+    """Rotations (n, 3, 3) in W of a wheel's frame: x ahead, y along the axle."""
+    heading = wheel.heading + motion.swivel_angles[:, robot.wheel_names.index(wheel.name)]
+    frames: Array = motion.R_WB @ Rotation.from_euler("z", heading[:, np.newaxis]).as_matrix()
+    return frames
+
+
 def _hub_motion(robot: Robot, wheel: AnyWheel, motion: RobotMotion) -> tuple[Array, Array, Array]:
     """Positions, velocities and angular velocities (n, 3) of a wheel's hub in W."""
     index = robot.wheel_names.index(wheel.name)
-    heading = wheel.heading + motion.swivel_angles[:, index]
-    zeros = np.zeros(len(heading))
-    forward_B = np.column_stack([np.cos(heading), np.sin(heading), zeros])
-    axle_B = np.column_stack([-np.sin(heading), np.cos(heading), zeros])
-    r_W = _apply(motion.R_WB, wheel.p_BoHo_B - wheel.swivel_offset * forward_B)
-    arm_W = _apply(motion.R_WB, -wheel.swivel_offset * forward_B)
+    R_WF = _heading_frames(robot, wheel, motion)
+    arm_W = -wheel.swivel_offset * R_WF[:, :, 0]
+    r_W = motion.R_WB @ wheel.p_BoHo_B + arm_W
     swivel_W = motion.swivel_rates[:, index, np.newaxis] * motion.R_WB[:, :, 2]
     v_WH = motion.v_WB + np.cross(motion.w_WB, r_W) + np.cross(swivel_W, arm_W)
-    turning_W = motion.wheel_speeds[:, index, np.newaxis] * _apply(motion.R_WB, axle_B)
+    turning_W = motion.wheel_speeds[:, index, np.newaxis] * R_WF[:, :, 1]
     return motion.p_WB + r_W, v_WH, motion.w_WB + swivel_W + turning_W
 
 
 def _moving_ellipsoids(robot: Robot, wheel: AnyWheel, motion: RobotMotion, p_WH: Array) -> _Ellipsoids:
     """The ellipsoids of a wheel whose hub is at p_WH (n, 3)."""
     index = robot.wheel_names.index(wheel.name)
-    heading = wheel.heading + motion.swivel_angles[:, index]
-    R_WF = motion.R_WB @ Rotation.from_euler("z", heading[:, np.newaxis]).as_matrix()
+    R_WF = _heading_frames(robot, wheel, motion)
     a, r, centers_H, axes_H = _ellipsoids(wheel)
-    angle = np.broadcast_to(motion.wheel_angles[:, index, np.newaxis], (len(heading), len(centers_H)))
+    angle = np.broadcast_to(motion.wheel_angles[:, index, np.newaxis], (len(p_WH), len(centers_H)))
     centers_W = p_WH[:, np.newaxis] + rotate_about_axle(angle, centers_H) @ R_WF.transpose(0, 2, 1)
     axes_W = rotate_about_axle(angle, axes_H) @ R_WF.transpose(0, 2, 1)
     return _Ellipsoids(a, r, centers_W, axes_W)
@@ -211,8 +247,3 @@ def _ellipsoids(wheel: AnyWheel) -> tuple[float, float, Array, Array]:
     if ring is None:
         return 0.5 * wheel.width, wheel.radius, np.zeros((1, 3)), np.array([[0.0, 1.0, 0.0]])
     return ring.semi_axis, ring.roller_radius, ring.centers_H, ring.axes_H
-
-
-def _apply(rotations: Array, vectors: Array) -> Array:
-    product: Array = np.einsum("nij,nj->ni", rotations, vectors)
-    return product

@@ -5,6 +5,7 @@ from itertools import cycle
 import numpy as np
 from matplotlib.axes import Axes
 
+from rollerbench import analysis
 from rollerbench.recording import Recording
 from rollerbench.report.drawing import COLORS, STYLES, new_figure, svg_text
 
@@ -16,6 +17,7 @@ def run_figures(recording: Recording) -> dict[str, str]:
         "pose_error": pose_error(recording),
         "wheel_speeds": wheel_speeds(recording),
         "wheel_slip": wheel_slip(recording),
+        "error_budget": error_budget(recording),
     }
 
 
@@ -74,6 +76,21 @@ def wheel_slip(recording: Recording) -> str:
     axes.set_ylabel("slip over the ground [mm/s]")
     axes.set_xlabel("time [s]")
     axes.legend()
+    return svg_text(figure)
+
+
+def error_budget(recording: Recording) -> str:
+    """Parts of the pose error over time."""
+    budget = analysis.error_budget(recording)
+    figure, rows = new_figure(3)
+    labels = ("x [mm]", "y [mm]", "yaw [deg]")
+    for index, (axes, label, scale) in enumerate(zip(rows, labels, (1e3, 1e3, np.degrees(1.0)), strict=True)):
+        for (name, part), color, style in zip(budget.parts.items(), cycle(COLORS), cycle(STYLES), strict=False):
+            axes.plot(recording.time, scale * part[:, index], style, color=color, label=name, linewidth=1.3)
+        axes.plot(recording.time, scale * budget.total[:, index], color="0.2", label="pose error", linewidth=0.8)
+        axes.set_ylabel(label)
+    rows[0].legend()
+    rows[-1].set_xlabel("time [s]")
     return svg_text(figure)
 
 

@@ -6,6 +6,7 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
+from rollerbench.report.budget import COLUMNS, budgets
 from rollerbench.report.rows import summary_rows
 
 TITLES = {
@@ -13,6 +14,7 @@ TITLES = {
     "pose_error": "Simulated minus reference pose",
     "wheel_speeds": "Wheel speeds",
     "wheel_slip": "Slip of the wheels over the ground",
+    "error_budget": "Parts of the pose error",
 }
 
 
@@ -27,5 +29,10 @@ def run_page(summary: Mapping[str, Any], figures: Mapping[str, str], *, has_reco
     environment = Environment(loader=PackageLoader("rollerbench.report"), autoescape=True, undefined=StrictUndefined)
     drawn = [(TITLES[name], Markup(svg[svg.index("<svg") :])) for name, svg in figures.items()]
     return environment.get_template("run.html.j2").render(
-        summary=summary, rows=summary_rows(summary), figures=drawn, has_recording=has_recording
+        summary=summary,
+        rows=summary_rows(summary),
+        budgets=budgets(summary),
+        budget_columns=COLUMNS,
+        figures=drawn,
+        has_recording=has_recording,
     )

@@ -23,11 +23,24 @@ def summary_rows(summary: Mapping[str, Any]) -> list[Row]:
         ("Yaw error", f"{_degrees(error['final_yaw'])}, largest {_degrees(error['max_yaw'])}"),
         ("Wheel slip", f"rms {_mm(summary['wheel_slip']['rms'])}/s, largest {_mm(summary['wheel_slip']['max'])}/s"),
         ("Height ripple", f"{_mm(summary['height_ripple'])}"),
-        ("Real-time factor", f"{summary['realtime_factor']:.1f}"),
+        ("Real-time factor", f"{summary['realtime_factor']:.1f}, {summary['engine']}"),
     ]
+    if summary["cross_check"]:
+        rows += _cross_check_rows(summary["cross_check"], summary["simulated_final_pose"])
     if summary["failure"]:
         rows.insert(0, ("Failed", summary["failure"]))
     return rows
+
+
+def _cross_check_rows(second: Mapping[str, Any], pose: list[float]) -> list[Row]:
+    """What a second engine says, and how far it ends from the first."""
+    end = second["simulated_final_pose"]
+    apart = math.dist(end[:2], pose[:2])
+    rows = [
+        (f"{second['engine']}: pose", _pose(end)),
+        ("  from this one", f"{_mm(apart)}, {_degrees(end[2] - pose[2])}"),
+    ]
+    return [*rows, ("  failed", second["failure"])] if second["failure"] else rows
 
 
 def _mm(metres: float) -> str:

@@ -6,6 +6,7 @@ from typing import Any
 from rich.markup import escape
 from rich.table import Table
 
+from rollerbench.report.budget import COLUMNS, budgets
 from rollerbench.report.rows import summary_rows
 
 
@@ -16,6 +17,21 @@ def summary_table(summary: Mapping[str, Any]) -> Table:
     table.add_column()
     for label, value in summary_rows(summary):
         table.add_row(label, escape(value))
+    return table
+
+
+def budget_table(summary: Mapping[str, Any]) -> Table:
+    """Why the pose is not where the equations say; a second engine's budget under the first one's."""
+    table = Table(title="Where the pose error comes from", title_justify="left", title_style="bold")
+    for index, column in enumerate(COLUMNS):
+        table.add_column(escape(column), justify="right" if 0 < index < len(COLUMNS) - 1 else "left")
+    found = budgets(summary)
+    for engine, rows in found.items():
+        if len(found) > 1:
+            table.add_row(f"[bold]{engine}[/bold]")
+        for row in rows:
+            table.add_row(*map(escape, row))
+        table.add_section()
     return table
 
 

@@ -13,11 +13,12 @@ from rollerbench.recording import Recording
 from rollerbench.report.figures import run_figures
 from rollerbench.report.page import run_page
 from rollerbench.sdf import robot_to_sdf
+from rollerbench.simulation.log import Simulated
 from rollerbench.simulation.scenario import Scenario
 
 RUN_FILES = {
     *("scenario.yaml", "robot.yaml", "model.sdf", "recording.parquet", "summary.json"),
-    *("recording.html", "report.html", "figures"),
+    *("recording.html", "report.html", "figures", "cross_check.parquet"),
 }
 """Everything that a run writes, and so may replace."""
 
@@ -46,7 +47,12 @@ def check_folder(folder: Path) -> None:
 
 
 def write_folder(
-    folder: Path, scenario: Scenario, recording: Recording, summary: Mapping[str, Any], page: str | None
+    folder: Path,
+    scenario: Scenario,
+    recording: Recording,
+    summary: Mapping[str, Any],
+    page: str | None,
+    second: Simulated | None = None,
 ) -> None:
     """Writes a run under a temporary name beside its folder, then renames: no half-written run is ever seen."""
     building = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}."))
@@ -67,6 +73,8 @@ def write_folder(
             if text is not None:
                 (building / name).write_text(text, encoding="utf-8")
         (building / "recording.parquet").write_bytes(recording.to_bytes())
+        if second is not None:
+            (building / "cross_check.parquet").write_bytes(second.recording.to_bytes())
         building.chmod(0o755)
         if folder.exists():
             old = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}."))

@@ -19,6 +19,9 @@ from rollerbench.kinematics.drivetrain import WheelDrive
 OF_THE_ROBOT = ("radius_scale", "position_offset", "heading_offset_deg", "friction", "center_of_mass")
 """Fields of `Errors` that change the robot's description."""
 
+OF_THE_KINEMATICS = ("radius_scale", "position_offset", "heading_offset_deg")
+"""Those of them that change the wheels' equations."""
+
 OF_THE_DRIVETRAIN = ("gear_error", "backlash_deg", "encoder_counts")
 """Fields of `Errors` that driven wheels have."""
 
@@ -185,6 +188,16 @@ class Errors(Part):
             return validate(Robot, data)
         except DescriptionError as error:
             raise DescriptionError(f"errors: the robot cannot be like that: {error}") from error
+
+    def stages(self, robot: Robot) -> dict[str, Robot]:
+        """The robot with one injected error of its wheels' geometry after the other, by the error's name."""
+        robots, so_far = {}, Errors()
+        for field in OF_THE_KINEMATICS:
+            value = getattr(self, field)
+            if value:
+                so_far = so_far.model_copy(update={field: value})
+                robots[field] = so_far.applied(robot)
+        return robots
 
     def _apply_to(self, wheel: dict[str, Any], name: str) -> None:
         scale = _of(self.radius_scale, name, 1.0)

@@ -1,4 +1,10 @@
-"""From a station's logs to a recording."""
+"""From what an engine simulated to a recording."""
+
+import platform
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from importlib.metadata import version
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,21 +23,105 @@ from rollerbench.simulation.station import Station
 
 Array = NDArray[np.float64]
 
+Progress = Callable[[float], None]
+"""Called with the simulated time now and then [s]."""
 
-def recording_of(station: Station, scenario: Scenario, context: Context, metadata: dict[str, str]) -> Recording:
-    """Everything recorded, up to the first sample that is not finite."""
-    parts = station.parts
-    logs = {name: sink.FindLog(context) for name, sink in parts.logs.items()}
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Samples:
+    """What an engine simulated, one sample a step.
+
+    Attributes:
+        time: Times (n,) [s].
+        motion: The robot's motion, with its imperfections.
+        command: Commanded speeds (n, n_driven) of the driven wheels [rad/s].
+        measured: Their measured speeds (n, n_driven) [rad/s].
+        effort: Torques (n, n_driven) of their motors [N m].
+        odometry: Poses (n, 3) from the measured speeds [m, m, rad].
+    """
+
+    time: Array
+    motion: RobotMotion
+    command: Array
+    measured: Array
+    effort: Array
+    odometry: Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Simulated:
+    """What came out of an engine.
+
+    Attributes:
+        recording: Samples up to the end, or to where it failed.
+        failure: Why it did not reach the end, or None.
+        wall_time: Time that it took, without building and writing [s].
+    """
+
+    recording: Recording
+    failure: str | None
+    wall_time: float
+
+
+def provenance(scenario: Scenario, engine: str) -> dict[str, Any]:
+    """What a recording tells of the run that it comes from, so that it can be analysed alone."""
+    injected = scenario.errors.stages(scenario.robot)
+    return {
+        "robot": scenario.robot.name,
+        "scenario": scenario.name,
+        "engine": engine,
+        **versions(),
+        "robot_description": scenario.robot.model_dump(mode="json", exclude_none=True),
+        "injected": {name: robot.model_dump(mode="json", exclude_none=True) for name, robot in injected.items()},
+        "rollers": scenario.controller.rollers,
+        "drivetrain": scenario.errors.drives(scenario.robot) is not None,
+    }
+
+
+def versions() -> dict[str, str]:
+    """Versions of what computed a result."""
+    return {"rollerbench": version("rollerbench"), "drake": version("drake"), "python": platform.python_version()}
+
+
+def station_samples(station: Station, scenario: Scenario, context: Context) -> Samples:
+    """Everything that a station logged, up to the first sample that is not finite."""
+    model = station.parts.model
+    logs = {name: sink.FindLog(context) for name, sink in station.parts.logs.items()}
     time = logs["state"].sample_times()
     data = {name: log.data().T for name, log in logs.items()}
     # A failure may have left the logs of unequal length.
     count = min(len(rows) for rows in data.values())
     finite = np.all([np.isfinite(rows[:count]).all(axis=1) for rows in data.values()], axis=0)
     end = count if finite.all() else int(np.argmin(finite))
-    time = time[:end]
     data = {name: rows[:end] for name, rows in data.items()}
+    motion, measured = robot_motion(model, data["state"]), data["wheel_speeds"]
+    actuated = [actuator.joint().name() for actuator in model.actuators]
+    driven = [actuated.index(model.drive_joint(wheel).name()) for wheel in model.robot.driven_wheels]
+    return Samples(
+        time=time[:end],
+        motion=motion,
+        command=data["wheel_speed_command"],
+        measured=measured,
+        effort=data["net_actuation"][:, driven],
+        odometry=odometry_poses(scenario, measured, motion, scenario.plant.time_step)
+        if scenario.motion.steers
+        else data["odometry_q_xyt"],
+    )
 
-    motion = robot_motion(parts.model, data["state"])
+
+def odometry_poses(scenario: Scenario, measured: Array, motion: RobotMotion, time_step: float) -> Array:
+    """Poses (n, 3) from measured wheel speeds (n, n_driven), and where wheels steer from their measured angles too."""
+    kinematics = scenario.motion.kinematics
+    if scenario.motion.steers:
+        twist = kinematics.forward_at(measured, motion.swivel_angles)
+    else:
+        twist = kinematics.forward(measured)
+    return accumulate(np.zeros(3), time_step * twist[:-1])
+
+
+def recording_of(samples: Samples, scenario: Scenario, metadata: Mapping[str, Any]) -> Recording:
+    """Samples beside the reference, with the contacts of the wheels."""
+    time, motion = samples.time, samples.motion
     reference = scenario.motion.twist
     columns = {"time": time}
     columns |= dict(zip("xyz", motion.p_WB.T, strict=True))
@@ -40,19 +130,10 @@ def recording_of(station: Station, scenario: Scenario, context: Context, metadat
     columns |= _named(("vx", "vy", "wz"), motion.v_xyw_B)
     columns |= _named(("reference_x", "reference_y", "reference_yaw"), reference_poses(reference, time))
     columns |= _named(("reference_vx", "reference_vy", "reference_wz"), reference(time))
-    columns |= _named(("odometry_x", "odometry_y", "odometry_yaw"), _odometry(scenario, motion, data))
-    stepping = robot_motion(parts.model, _with_next_velocities(parts.model, data["state"]))
-    columns |= _wheel_columns(parts.model, motion, data)
-    columns |= _contact_columns(parts.model.robot, motion, stepping, scenario.bumps)
+    columns |= _named(("odometry_x", "odometry_y", "odometry_yaw"), samples.odometry)
+    columns |= _wheel_columns(scenario.robot, samples)
+    columns |= _contact_columns(scenario.simulated_robot, motion, scenario.bumps)
     return Recording(columns=columns, wheel_names=scenario.robot.wheel_names, metadata=metadata)
-
-
-def _odometry(scenario: Scenario, motion: RobotMotion, data: dict[str, Array]) -> Array:
-    """Poses (n, 3) from measured wheel speeds; where wheels steer on the way, from their measured angles too."""
-    if not scenario.motion.steers:
-        return data["odometry_q_xyt"]
-    twist = scenario.motion.kinematics.forward_at(data["wheel_speeds"], motion.swivel_angles)
-    return accumulate(np.zeros(3), scenario.plant.time_step * twist[:-1])
 
 
 def robot_motion(model: RobotModel, state: Array) -> RobotMotion:
@@ -83,49 +164,53 @@ def robot_motion(model: RobotModel, state: Array) -> RobotMotion:
     )
 
 
-def _with_next_velocities(model: RobotModel, state: Array) -> Array:
-    """States (n, nq + nv) whose velocities are those of the next sample.
+def _with_next_velocities(motion: RobotMotion) -> RobotMotion:
+    """The motion with the velocities of the next sample at the positions of this one.
 
-    The discrete plant finds them from the contacts at the present positions: a roller that has just touched the ground
-    spins only in the next sample. So these, at these positions, are the velocities that show slip.
+    Engines find them from the contacts at the present positions: a roller that has just touched the ground spins only
+    in the next sample. So these, at these positions, are the velocities that show slip.
     """
-    nq = model.plant.num_positions(model.model_instance)
-    return np.hstack([state[:, :nq], np.vstack([state[1:, nq:], state[-1:, nq:]])])
+
+    def shifted(values: Array) -> Array:
+        return np.concatenate([values[1:], values[-1:]])
+
+    names = ("v_WB", "w_WB", "wheel_speeds", "swivel_rates")
+    rollers = {name: shifted(speeds) for name, speeds in motion.roller_speeds.items()}
+    return replace(motion, roller_speeds=rollers, **{name: shifted(getattr(motion, name)) for name in names})
 
 
-def _wheel_columns(model: RobotModel, motion: RobotMotion, data: dict[str, Array]) -> dict[str, Array]:
-    robot = model.robot
+def _wheel_columns(robot: Robot, samples: Samples) -> dict[str, Array]:
     driven = [wheel.name for wheel in robot.driven_wheels]
-    actuated = [actuator.joint().name() for actuator in model.actuators]
-    missing = np.full(len(motion.p_WB), np.nan)
+    missing = np.full(len(samples.time), np.nan)
     columns: dict[str, Array] = {}
     for index, wheel in enumerate(robot.wheels):
-        joint = model.drive_joint(wheel).name()
+        motor = {"measured": samples.measured, "command": samples.command, "effort": samples.effort}
         values = {
-            "angle": motion.wheel_angles[:, index],
-            "speed": motion.wheel_speeds[:, index],
-            "measured": data["wheel_speeds"][:, driven.index(wheel.name)] if wheel.driven else missing,
-            "command": data["wheel_speed_command"][:, driven.index(wheel.name)] if wheel.driven else missing,
-            "effort": data["net_actuation"][:, actuated.index(joint)] if wheel.driven else missing,
-            "swivel": motion.swivel_angles[:, index],
+            "angle": samples.motion.wheel_angles[:, index],
+            "speed": samples.motion.wheel_speeds[:, index],
+            **{name: of[:, driven.index(wheel.name)] if wheel.driven else missing for name, of in motor.items()},
+            "swivel": samples.motion.swivel_angles[:, index],
         }
         columns |= {f"{wheel.name}.{name}": value for name, value in values.items()}
     return columns
 
 
-def _contact_columns(robot: Robot, motion: RobotMotion, stepping: RobotMotion, bumps: Bumps | None) -> dict[str, Array]:
-    yaw = motion.q_xyt[:, 2]
+def _contact_columns(robot: Robot, motion: RobotMotion, bumps: Bumps | None) -> dict[str, Array]:
+    yaw, stepping = motion.q_xyt[:, 2], _with_next_velocities(motion)
     columns: dict[str, Array] = {}
     for wheel in robot.wheels:
         contact = wheel_contact(robot, wheel, stepping, bumps)
         place = rotate(-yaw, contact.p_WC[:, :2] - motion.p_WB[:, :2])
-        slip = rotate(-yaw, contact.slip_W[:, :2])
+        slip, drive = (rotate(-yaw, vectors[:, :2]) for vectors in (contact.slip_W, contact.drive_W))
         values = {
             "contact_x": place[:, 0],
             "contact_y": place[:, 1],
             "depth": contact.depth,
             "slip_x": slip[:, 0],
             "slip_y": slip[:, 1],
+            "drive_x": drive[:, 0],
+            "drive_y": drive[:, 1],
+            "rolling_radius": contact.rolling_radius,
         }
         columns |= {f"{wheel.name}.{name}": value for name, value in values.items()}
     return columns

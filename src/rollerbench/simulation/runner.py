@@ -1,38 +1,22 @@
 """Runs a scenario: simulate, record, compare with the equations, write the run folder."""
 
-import math
-import time
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from pydrake.geometry import Meshcat
-from pydrake.math import RigidTransform, RollPitchYaw
-from pydrake.systems.analysis import ApplySimulatorConfig, Simulator
-from pydrake.systems.framework import Context
 
-from rollerbench.errors import DescriptionError, RollerbenchWarning, SimulationError
-from rollerbench.kinematics.profile import reference_poses
+from rollerbench.errors import RollerbenchWarning, SimulationError
 from rollerbench.recording import Recording
-from rollerbench.simulation.drake_config import simulator_config
+from rollerbench.simulation import drake_engine, mujoco_engine
 from rollerbench.simulation.folder import check_folder, write_folder
-from rollerbench.simulation.log import recording_of
+from rollerbench.simulation.log import Progress, Simulated
 from rollerbench.simulation.scenario import Scenario, load_scenario
-from rollerbench.simulation.station import Station
-from rollerbench.simulation.summary import summarize, versions
-from rollerbench.simulation.watch import fault
-from rollerbench.visualization.scene import SIMULATED_COLOR, draw_path, dress_scene, local_meshcat
-
-SETTLE_TIME = 0.25
-"""Time that the robot stands still, in a simulation of its own, to find how it rests on its wheels [s]."""
-
-CHUNK = 0.05
-"""Simulated time between two looks at the robot [s]."""
-
-Progress = Callable[[float], None]
+from rollerbench.simulation.summary import cross_check, summarize
+from rollerbench.visualization.scene import SIMULATED_COLOR, draw_path, local_meshcat
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,12 +28,14 @@ class RunResult:
         recording: Samples over time.
         summary: The content of summary.json.
         folder: The run folder; None if nothing was written.
+        cross_check: Samples of the second engine, where scenario.engine is "both".
     """
 
     scenario: Scenario
     recording: Recording
     summary: Mapping[str, Any]
     folder: Path | None
+    cross_check: Recording | None = None
 
 
 def run(
@@ -66,7 +52,7 @@ def run(
         scenario: Scenario, name of a shipped one, path to a scenario.yaml, or its content.
         output: Run folder to write, new or from an earlier run; by default runs/NAME.
         save: Whether to write the run folder.
-        meshcat: A Meshcat to show the robot in while it is simulated.
+        meshcat: A Meshcat to show the robot in while Drake simulates it.
         progress: Called with the simulated time [s] now and then.
 
     Returns:
@@ -82,98 +68,66 @@ def run(
     folder = Path(output if output is not None else Path("runs") / scenario.name) if save else None
     if folder is not None:
         check_folder(folder)
+    if scenario.engine != "drake":
+        mujoco_engine.check(scenario)
     _warn_about_step(scenario)
-    keep_page = scenario.recording.html and folder is not None
+    keep_page = scenario.recording.html and folder is not None and scenario.engine != "mujoco"
     if meshcat is None and keep_page:
         meshcat = local_meshcat()
-    station = Station(scenario, meshcat=meshcat, log=True)
-    simulator = Simulator(station)
-    try:
-        ApplySimulatorConfig(simulator_config(scenario), simulator)
-    except (RuntimeError, ValueError, SystemExit) as error:
-        raise DescriptionError(f"simulator: Drake refuses these settings: {error}") from error
-    context = simulator.get_mutable_context()
-    try:
-        _stand_at_rest(simulator, station, scenario)
-    except (RuntimeError, SystemExit) as error:
-        raise SimulationError(f"{scenario.name}: Drake cannot let the robot stand: {error}") from error
 
-    if meshcat is not None:
-        times = np.arange(0.0, scenario.duration, scenario.plant.time_step)
-        dress_scene(meshcat, scenario.robot, reference_poses(scenario.motion.twist, times))
-        meshcat.StartRecording(
-            frames_per_second=scenario.recording.frames_per_second, set_visualizations_while_recording=True
-        )
-    started = time.perf_counter()
-    failure = _advance(simulator, station, scenario, progress)
-    wall_time = time.perf_counter() - started
-    recording = recording_of(
-        station, scenario, context, {"robot": scenario.robot.name, "scenario": scenario.name, **versions()}
-    )
+    simulated = _simulated(scenario, meshcat, progress)
+    recording, failure = simulated.recording, simulated.failure
     if not len(recording.time):
         raise SimulationError(f"{scenario.name}: {failure}; nothing was recorded")
-    page = None
-    if meshcat is not None:
-        draw_path(meshcat, "simulated", recording.q_xyt, SIMULATED_COLOR, lift=0.004 * scenario.robot.body.size[0])
-        meshcat.StopRecording()
-        meshcat.PublishRecording()
-        page = meshcat.StaticHtml() if keep_page else None
-    summary = summarize(scenario, recording, wall_time=wall_time, failure=failure)
+    page = _page(meshcat, scenario, recording) if meshcat is not None and scenario.engine != "mujoco" else None
+    second = mujoco_engine.simulate(scenario) if scenario.engine == "both" and failure is None else None
+    half = _simulated(_at_half_step(scenario)) if scenario.check_step and failure is None else None
+    summary = summarize(
+        scenario,
+        simulated,
+        half_step=_change(half, recording) if half is not None else None,
+        second=cross_check(second) if second is not None else None,
+    )
     if folder is not None:
-        write_folder(folder, scenario, recording, summary, page)
-    result = RunResult(scenario=scenario, recording=recording, summary=summary, folder=folder)
+        write_folder(folder, scenario, recording, summary, page if keep_page else None, second)
+    result = RunResult(
+        scenario=scenario,
+        recording=recording,
+        summary=summary,
+        folder=folder,
+        cross_check=None if second is None else second.recording,
+    )
     if failure is not None:
         raise SimulationError(f"{scenario.name}: {failure}", result)
     return result
 
 
-def _stand_at_rest(simulator: Simulator, station: Station, scenario: Scenario) -> None:
-    """Starts the robot at the origin, at rest, its weight on its wheels as a moment of standing still leaves it."""
-    trial = Station(scenario, command="external")
-    waiting = Simulator(trial)
-    trial.GetInputPort("v_xyw_B").FixValue(waiting.get_mutable_context(), np.zeros(3))
-    model, plant_context = trial.parts.model, _plant_context(trial, waiting)
-    model.set_pose(plant_context, (0.0, 0.0, 0.0))
-    waiting.AdvanceTo(SETTLE_TIME)
-    what = fault(model, plant_context)
-    if what is not None:
-        raise SimulationError(f"{scenario.name}: before it was to move {what}")
-    positions = model.plant.GetPositions(plant_context)
-    pose = model.plant.EvalBodyPoseInWorld(plant_context, model.body)
-
-    model, plant_context = station.parts.model, _plant_context(station, simulator)
-    model.plant.SetPositions(plant_context, positions)
-    roll, pitch, _ = RollPitchYaw(pose.rotation()).vector()
-    upright = RigidTransform(RollPitchYaw(roll, pitch, 0.0), [0.0, 0.0, pose.translation()[2]])
-    model.plant.SetFreeBodyPose(plant_context, model.body, upright)
-    simulator.Initialize()
+def _simulated(scenario: Scenario, meshcat: Meshcat | None = None, progress: Progress | None = None) -> Simulated:
+    if scenario.engine == "mujoco":
+        return mujoco_engine.simulate(scenario, progress=progress)
+    return drake_engine.simulate(scenario, meshcat=meshcat, progress=progress)
 
 
-def _plant_context(station: Station, simulator: Simulator) -> Context:
-    return station.parts.model.plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
+def _page(meshcat: Meshcat, scenario: Scenario, recording: Recording) -> str:
+    draw_path(meshcat, "simulated", recording.q_xyt, SIMULATED_COLOR, lift=0.004 * scenario.robot.body.size[0])
+    meshcat.StopRecording()
+    meshcat.PublishRecording()
+    return meshcat.StaticHtml()
 
 
-def _advance(simulator: Simulator, station: Station, scenario: Scenario, progress: Progress | None) -> str | None:
-    """Simulates to the end; returns what went wrong, or None."""
-    context, model = simulator.get_context(), station.parts.model
-    plant_context = model.plant.GetMyContextFromRoot(context)
-    step, duration = scenario.plant.time_step, scenario.duration
-    # Times are multiples of the step, as Drake counts them, so that the last sample is part of the log.
-    steps, chunk = math.floor(duration / step + 1e-6), max(1, round(CHUNK / step))
-    try:
-        for count in [*range(chunk, steps, chunk), steps]:
-            now = count * step
-            simulator.AdvanceTo(now)
-            what = fault(model, plant_context)
-            if what is not None:
-                return f"at t = {now:.3f} s {what}"
-            if progress is not None:
-                progress(now)
-    except KeyboardInterrupt:
-        return f"interrupted at t = {context.get_time():.3f} s"
-    except (RuntimeError, SystemExit) as error:
-        return f"at t = {context.get_time():.3f} s Drake stopped: {error}"
-    return None
+def _at_half_step(scenario: Scenario) -> Scenario:
+    step = scenario.plant.time_step
+    if scenario.engine == "mujoco":
+        step = mujoco_engine.time_step(scenario)
+    return scenario.model_copy(
+        update={"plant": scenario.plant.model_copy(update={"time_step": 0.5 * step}), "check_step": False}
+    )
+
+
+def _change(half: Simulated, recording: Recording) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """Final pose at half the step minus that of the run (3,) [m, m, rad]."""
+    change: np.ndarray[Any, np.dtype[np.float64]] = half.recording.q_xyt[-1] - recording.q_xyt[-1]
+    return change
 
 
 def _warn_about_step(scenario: Scenario) -> None:

@@ -32,10 +32,12 @@ class OpenLoop(Part):
 
     Attributes:
         servo_time_constant: Time in which the wheel servos make up a speed difference of the whole robot [s].
+        rollers: "textbook", or "finite" for equations that count the rollers of Mecanum wheels (`WheelKinematics`).
     """
 
     type: Literal["open_loop"] = "open_loop"
     servo_time_constant: Positive = DRIVE_TIME_CONSTANT
+    rollers: Literal["textbook", "finite"] = "textbook"
 
 
 class PlantSettings(Part):
@@ -119,6 +121,8 @@ class Scenario(Part):
         plant: How Drake simulates.
         ground: What the robot stands on.
         errors: What differs from robot.yaml in the simulated robot.
+        engine: "drake", "mujoco", or "both": Drake, and MuJoCo as a cross-check.
+        check_step: Whether to run a second time with half the step, to see what the step does.
         simulator: Further settings of Drake's simulator.
         recording: What the run leaves behind.
         seed: Seed of everything random.
@@ -133,6 +137,8 @@ class Scenario(Part):
     plant: PlantSettings = PlantSettings()
     ground: Ground = Ground()
     errors: Errors = Errors()
+    engine: Literal["drake", "mujoco", "both"] = "drake"
+    check_step: Flag = False
     simulator: SimulatorSettings = SimulatorSettings()
     recording: RecordingSettings = RecordingSettings()
     seed: Annotated[int, Field(strict=True, ge=0)] = 0
@@ -180,7 +186,7 @@ class Scenario(Part):
             KinematicsError: wheel speeds are commanded, and they do not determine the twist.
             DescriptionError: a wheel would have to turn faster than its max_speed.
         """
-        kinematics = WheelKinematics(self.robot)
+        kinematics = WheelKinematics(self.robot, rollers=self.controller.rollers)
         if isinstance(self.command, WheelSpeedsCommand):
             speeds = self.command.wheel_speed_profile(self.robot, self.duration, self.plant.time_step)
             motion = wheel_motion(kinematics, speeds)

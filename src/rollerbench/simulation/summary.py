@@ -1,54 +1,74 @@
 """The content of summary.json."""
 
 import dataclasses
-import platform
-from importlib.metadata import version
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from rollerbench.analysis import height_ripple, pose_error, wheel_slip
-from rollerbench.analysis.pose_error import path_length, rotation
+from rollerbench.analysis import error_budget, height_ripple, pose_error, wheel_slip
+from rollerbench.analysis.pose_error import last_direction, path_length, rotation
+from rollerbench.kinematics.odometry import rotate
 from rollerbench.recording import Recording
+from rollerbench.simulation.log import Simulated, versions
 from rollerbench.simulation.scenario import Scenario
 
-
-def versions() -> dict[str, str]:
-    """Versions of what computed a result."""
-    return {"rollerbench": version("rollerbench"), "drake": version("drake"), "python": platform.python_version()}
+Array = NDArray[np.float64]
 
 
-def summarize(scenario: Scenario, recording: Recording, *, wall_time: float, failure: str | None) -> dict[str, Any]:
+def summarize(
+    scenario: Scenario, simulated: Simulated, *, half_step: Array | None = None, second: dict[str, Any] | None = None
+) -> dict[str, Any]:
     """Key figures of a run, SI units.
 
     Args:
         scenario: What was simulated.
-        recording: What was recorded.
-        wall_time: Time that the simulation took, without building and writing [s].
-        failure: Why it did not reach the end, or None.
+        simulated: What came out.
+        half_step: Final pose (3,) of a second run with half the step minus this one's.
+        second: Figures of a second engine, from `cross_check`.
     """
-    simulated = float(recording.time[-1])
+    recording, duration = simulated.recording, float(simulated.recording.time[-1])
     return {
         "robot": scenario.robot.name,
         "scenario": scenario.name,
-        "status": "ok" if failure is None else "failed",
-        "failure": failure,
+        "engine": recording.metadata["engine"],
+        "status": "ok" if simulated.failure is None else "failed",
+        "failure": simulated.failure,
         "seed": scenario.seed,
         "versions": versions(),
-        "duration": simulated,
-        "wall_time": wall_time,
-        "realtime_factor": simulated / wall_time,
+        "duration": duration,
+        "wall_time": simulated.wall_time,
+        "realtime_factor": duration / simulated.wall_time,
         "path_length": path_length(recording),
         "rotation": rotation(recording),
         "reference_final_pose": _pose(recording.reference_q_xyt),
+        **_outcome(recording, half_step),
+        "cross_check": second,
+    }
+
+
+def cross_check(second: Simulated) -> dict[str, Any]:
+    """Figures of a second engine that simulated the same scenario."""
+    engine = second.recording.metadata["engine"]
+    return {"engine": engine, "failure": second.failure, **_outcome(second.recording, None)}
+
+
+def _outcome(recording: Recording, half_step: Array | None) -> dict[str, Any]:
+    change = None
+    if half_step is not None:
+        ahead, left = rotate(-last_direction(recording), half_step[:2])
+        x, y, yaw = half_step
+        values = {"x": x, "y": y, "yaw": yaw, "along_track": ahead, "cross_track": left}
+        change = {name: float(value) for name, value in values.items()}
+    return {
         "simulated_final_pose": _pose(recording.q_xyt),
         "odometry_final_pose": _pose(recording.odometry_q_xyt),
         "pose_error": dataclasses.asdict(pose_error(recording)),
         "wheel_slip": wheel_slip(recording),
         "height_ripple": height_ripple(recording),
-        "error_budget": None,
+        "error_budget": {"parts": error_budget(recording).to_dict(), "half_step": change},
     }
 
 
-def _pose(q_xyt: np.ndarray[Any, np.dtype[np.float64]]) -> list[float]:
+def _pose(q_xyt: Array) -> list[float]:
     return [float(value) for value in q_xyt[-1]]

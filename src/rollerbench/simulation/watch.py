@@ -3,11 +3,16 @@
 import math
 
 import numpy as np
-from pydrake.math import RollPitchYaw
+from numpy.typing import NDArray
 from pydrake.systems.framework import Context
 
+from rollerbench.description import Robot
 from rollerbench.plant import RobotModel
 from rollerbench.sdf.contact import static_penetration
+
+Array = NDArray[np.float64]
+
+NOT_FINITE = "the state is not finite (NaN or infinite): accepted: a smaller plant.time_step"
 
 TIP_ANGLE = math.radians(45)
 """A robot inclined by more has tipped over [rad]."""
@@ -20,15 +25,18 @@ def fault(model: RobotModel, context: Context) -> str | None:
     """What is wrong with the robot's state in a context of its plant, or None."""
     state = model.plant.GetPositionsAndVelocities(context, model.model_instance)
     if not np.isfinite(state).all():
-        return "the state is not finite (NaN or infinite): accepted: a smaller plant.time_step"
+        return NOT_FINITE
     pose = model.plant.EvalBodyPoseInWorld(context, model.body)
-    roll, pitch, _ = RollPitchYaw(pose.rotation()).vector()
-    tilt = math.acos(min(1.0, max(-1.0, math.cos(roll) * math.cos(pitch))))
+    return wrong_pose(model.robot, pose.translation(), pose.rotation().matrix())
+
+
+def wrong_pose(robot: Robot, p_WB: Array, R_WB: Array) -> str | None:
+    """What is wrong with the pose of a robot's body, position (3,) and rotation (3, 3), on level ground, or None."""
+    tilt = math.acos(min(1.0, max(-1.0, float(R_WB[2, 2]))))
     if tilt > TIP_ANGLE:
         return f"the robot tipped over: its body is inclined by {math.degrees(tilt):.0f} deg"
-    rest = -model.robot.ground_height - static_penetration(model.robot)
-    rise = float(pose.translation()[2]) - rest
-    allowed = HEIGHT_SHARE * min(wheel.radius for wheel in model.robot.wheels)
+    rise = float(p_WB[2]) + robot.ground_height + static_penetration(robot)
+    allowed = HEIGHT_SHARE * min(wheel.radius for wheel in robot.wheels)
     if rise > allowed:
         return f"the robot left the ground: its body rose by {rise:.3g} m"
     if rise < -allowed:

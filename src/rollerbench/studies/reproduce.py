@@ -10,7 +10,7 @@ from rollerbench.description.files import write_atomically
 from rollerbench.errors import ResourceError
 from rollerbench.report.reproduction import reproduction_page
 from rollerbench.simulation import RunResult, run
-from rollerbench.simulation.summary import versions
+from rollerbench.simulation.log import versions
 from rollerbench.studies import differential_drive, mecanum, six_wheel
 from rollerbench.studies.paper import Findings, Paper
 

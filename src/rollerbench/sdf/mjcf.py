@@ -1,0 +1,139 @@
+"""A robot as an MJCF model for MuJoCo, on level ground, with velocity servos on its wheels."""
+
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+from lxml import etree
+from scipy.spatial.transform import Rotation
+
+from rollerbench.description import AnyWheel, Robot, RollerWheel
+from rollerbench.description.inertia import RigidInertia
+from rollerbench.description.mass import body_inertia, fork_inertia, hub_inertia, roller_inertia, roller_poses_H
+from rollerbench.sdf import names
+
+CONTACT = {"solref": "0.002 1", "solimp": "0.99 0.99 0.001"}
+"""Stiff contact: a robot sinks in by a few micrometres. Time constants of two steps of 1 ms are the least."""
+
+DEFAULT_STEP = 0.001
+"""Step of an exported model [s]."""
+
+
+def robot_to_mjcf(
+    robot: Robot,
+    *,
+    friction: float = 0.8,
+    gravity: Iterable[float] = (0.0, 0.0, -9.81),
+    drive_damping: Mapping[str, float] | None = None,
+    steering_stiffness: Mapping[str, float] | None = None,
+    steering_damping: Mapping[str, float] | None = None,
+    time_step: float = DEFAULT_STEP,
+) -> str:
+    """The robot as MJCF text with ground at z = 0, complete in itself.
+
+    Bodies and joints have the names and signs of the SDF model. Collision shapes are the same ellipsoids; nothing but
+    the ground collides with them. Each driven wheel has a velocity actuator, each steered one a position actuator,
+    named as their joints.
+
+    Args:
+        robot: The robot.
+        friction: Coefficient of friction of the ground; with a wheel's it combines to 2ab/(a+b), as in Drake.
+        gravity: Acceleration (3,) [m/s2].
+        drive_damping: Torque over the error of the wheel speed by wheel [N m s]; 1 for those left out.
+        steering_stiffness: Torque over the error of the steering angle by wheel [N m]; 1 for those left out.
+        steering_damping: Torque over the error of the steering speed by wheel [N m s]; 1 for those left out.
+        time_step: MuJoCo's step [s].
+    """
+    root = etree.Element("mujoco", model=robot.name)
+    _add(root, "compiler", angle="radian", autolimits="true", inertiafromgeom="false")
+    option = _add(root, "option", timestep=_numbers([time_step]), gravity=_numbers(gravity), cone="elliptic")
+    option.set("integrator", "implicitfast")
+    option.set("impratio", "100")
+    _add(option, "flag", autoreset="disable")
+    world = _add(root, "worldbody")
+    # MuJoCo takes the larger friction and the mean of the stiffnesses: the wheels carry the combined friction.
+    ground = _add(world, "geom", name="ground", type="plane", size="0 0 1", contype="1", conaffinity="0")
+    ground.attrib.update({**CONTACT, "friction": "0 0 0"})
+    body = _add(world, "body", name=names.BODY, pos=_numbers([0, 0, -robot.ground_height]))
+    _add(body, "freejoint", name="floating_base")
+    _add_inertial(body, body_inertia(robot.body))
+    half = [0.5 * side for side in robot.body.size]
+    box = _add(body, "geom", name="box", type="box", size=_numbers(half), pos=_numbers(robot.body.box_center))
+    _add_contact(box, _combined(min(wheel.friction for wheel in robot.wheels), friction))
+    actuators = etree.Element("actuator")
+    for wheel in robot.wheels:
+        _add_wheel(body, wheel, _combined(wheel.friction, friction))
+        if wheel.driven:
+            gain = (drive_damping or {}).get(wheel.name, 1.0)
+            motor = _add(actuators, "velocity", name=names.drive_joint(wheel.name), joint=names.drive_joint(wheel.name))
+            motor.set("kv", _numbers([gain]))
+            _limit(motor, wheel.max_effort)
+    for wheel in robot.steered_wheels:
+        stiffness = (steering_stiffness or {}).get(wheel.name, 1.0)
+        damping = (steering_damping or {}).get(wheel.name, 1.0)
+        joint = names.swivel_joint(wheel.name)
+        motor = _add(actuators, "position", name=joint, joint=joint, kp=_numbers([stiffness]), kv=_numbers([damping]))
+        _limit(motor, getattr(wheel, "max_steering_effort", None))
+    root.append(actuators)
+    text: bytes = etree.tostring(root, pretty_print=True, encoding="utf-8")
+    return text.decode("utf-8")
+
+
+def _add_wheel(body: etree._Element, wheel: AnyWheel, friction: float) -> None:
+    carrier, position = body, wheel.center_B
+    rotation = Rotation.from_euler("z", wheel.heading_degrees, degrees=True)
+    if wheel.swivels:
+        carrier = _add_body(body, names.fork(wheel.name), wheel.p_BoHo_B, rotation)
+        _add(carrier, "joint", name=names.swivel_joint(wheel.name), type="hinge", axis="0 0 1")
+        _add_inertial(carrier, fork_inertia(wheel))
+        position, rotation = np.array([-wheel.swivel_offset, 0.0, 0.0]), Rotation.identity()
+    hub = _add_body(carrier, names.hub(wheel.name), position, rotation)
+    _add(hub, "joint", name=names.drive_joint(wheel.name), type="hinge", axis="0 1 0")
+    _add_inertial(hub, hub_inertia(wheel))
+    if not isinstance(wheel, RollerWheel):
+        radii = (wheel.radius, 0.5 * wheel.width, wheel.radius)
+        _add_contact(_add(hub, "geom", name=f"{wheel.name}_tyre", type="ellipsoid", size=_numbers(radii)), friction)
+        return
+    ring = wheel.ring
+    for index, (matrix, center) in enumerate(roller_poses_H(wheel)):
+        roller = _add_body(hub, names.roller(wheel.name, index), center, Rotation.from_matrix(matrix))
+        joint = _add(roller, "joint", name=names.roller_joint(wheel.name, index), type="hinge", axis="1 0 0")
+        joint.set("damping", _numbers([wheel.rollers.damping]))
+        _add_inertial(roller, roller_inertia(wheel))
+        radii = (ring.semi_axis, ring.roller_radius, ring.roller_radius)
+        _add_contact(_add(roller, "geom", type="ellipsoid", size=_numbers(radii)), friction)
+
+
+def _add_body(parent: etree._Element, name: str, position: Iterable[float], rotation: Rotation) -> etree._Element:
+    quaternion = rotation.as_quat(canonical=True, scalar_first=True)
+    return _add(parent, "body", name=name, pos=_numbers(position), quat=_numbers(quaternion))
+
+
+def _add_inertial(body: etree._Element, inertia: RigidInertia) -> None:
+    moment = inertia.moment
+    full = [moment[i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
+    _add(body, "inertial", pos=_numbers(inertia.com), mass=_numbers([inertia.mass]), fullinertia=_numbers(full))
+
+
+def _add_contact(geom: etree._Element, friction: float) -> None:
+    geom.set("contype", "0")
+    geom.set("conaffinity", "1")
+    geom.set("condim", "3")
+    geom.set("friction", _numbers([friction, 0.0, 0.0]))
+    geom.attrib.update(CONTACT)
+
+
+def _combined(first: float, second: float) -> float:
+    return 2 * first * second / (first + second)
+
+
+def _limit(motor: etree._Element, effort: float | None) -> None:
+    if effort is not None:
+        motor.set("forcerange", _numbers([-effort, effort]))
+
+
+def _add(parent: etree._Element, tag: str, **attributes: str) -> etree._Element:
+    return etree.SubElement(parent, tag, attrib=attributes)
+
+
+def _numbers(values: Iterable[float]) -> str:
+    return " ".join(f"{float(value) + 0.0:.12g}" for value in values)

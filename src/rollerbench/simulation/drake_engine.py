@@ -1,0 +1,105 @@
+"""Simulates a scenario with Drake."""
+
+import math
+import time
+
+import numpy as np
+from pydrake.geometry import Meshcat
+from pydrake.math import RigidTransform, RollPitchYaw
+from pydrake.systems.analysis import ApplySimulatorConfig, Simulator
+from pydrake.systems.framework import Context
+
+from rollerbench.errors import DescriptionError, SimulationError
+from rollerbench.kinematics.profile import reference_poses
+from rollerbench.simulation.drake_config import simulator_config
+from rollerbench.simulation.log import Progress, Simulated, provenance, recording_of, station_samples
+from rollerbench.simulation.scenario import Scenario
+from rollerbench.simulation.station import Station
+from rollerbench.simulation.watch import fault
+from rollerbench.visualization.scene import dress_scene
+
+SETTLE_TIME = 0.25
+"""Time that the robot stands still, in a simulation of its own, to find how it rests on its wheels [s]."""
+
+CHUNK = 0.05
+"""Simulated time between two looks at the robot [s]."""
+
+
+def simulate(scenario: Scenario, *, meshcat: Meshcat | None = None, progress: Progress | None = None) -> Simulated:
+    """Runs a scenario in Drake; a meshcat records it.
+
+    Raises:
+        DescriptionError: Drake refuses a setting.
+        SimulationError: the robot cannot stand.
+    """
+    station = Station(scenario, meshcat=meshcat, log=True)
+    simulator = Simulator(station)
+    try:
+        ApplySimulatorConfig(simulator_config(scenario), simulator)
+    except (RuntimeError, ValueError, SystemExit) as error:
+        raise DescriptionError(f"simulator: Drake refuses these settings: {error}") from error
+    try:
+        _stand_at_rest(simulator, station, scenario)
+    except (RuntimeError, SystemExit) as error:
+        raise SimulationError(f"{scenario.name}: Drake cannot let the robot stand: {error}") from error
+    if meshcat is not None:
+        times = np.arange(0.0, scenario.duration, scenario.plant.time_step)
+        dress_scene(meshcat, scenario.robot, reference_poses(scenario.motion.twist, times))
+        meshcat.StartRecording(
+            frames_per_second=scenario.recording.frames_per_second, set_visualizations_while_recording=True
+        )
+    started = time.perf_counter()
+    failure = _advance(simulator, station, scenario, progress)
+    wall_time = time.perf_counter() - started
+    samples = station_samples(station, scenario, simulator.get_context())
+    recording = recording_of(samples, scenario, provenance(scenario, "drake"))
+    return Simulated(recording=recording, failure=failure, wall_time=wall_time)
+
+
+def _stand_at_rest(simulator: Simulator, station: Station, scenario: Scenario) -> None:
+    """Starts the robot at the origin, at rest, its weight on its wheels as a moment of standing still leaves it."""
+    trial = Station(scenario, command="external")
+    waiting = Simulator(trial)
+    trial.GetInputPort("v_xyw_B").FixValue(waiting.get_mutable_context(), np.zeros(3))
+    model, plant_context = trial.parts.model, _plant_context(trial, waiting)
+    model.set_pose(plant_context, (0.0, 0.0, 0.0))
+    waiting.AdvanceTo(SETTLE_TIME)
+    what = fault(model, plant_context)
+    if what is not None:
+        raise SimulationError(f"{scenario.name}: before it was to move {what}")
+    positions = model.plant.GetPositions(plant_context)
+    pose = model.plant.EvalBodyPoseInWorld(plant_context, model.body)
+
+    model, plant_context = station.parts.model, _plant_context(station, simulator)
+    model.plant.SetPositions(plant_context, positions)
+    roll, pitch, _ = RollPitchYaw(pose.rotation()).vector()
+    upright = RigidTransform(RollPitchYaw(roll, pitch, 0.0), [0.0, 0.0, pose.translation()[2]])
+    model.plant.SetFreeBodyPose(plant_context, model.body, upright)
+    simulator.Initialize()
+
+
+def _plant_context(station: Station, simulator: Simulator) -> Context:
+    return station.parts.model.plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
+
+
+def _advance(simulator: Simulator, station: Station, scenario: Scenario, progress: Progress | None) -> str | None:
+    """Simulates to the end; returns what went wrong, or None."""
+    context, model = simulator.get_context(), station.parts.model
+    plant_context = model.plant.GetMyContextFromRoot(context)
+    step, duration = scenario.plant.time_step, scenario.duration
+    # Times are multiples of the step, as Drake counts them, so that the last sample is part of the log.
+    steps, chunk = math.floor(duration / step + 1e-6), max(1, round(CHUNK / step))
+    try:
+        for count in [*range(chunk, steps, chunk), steps]:
+            now = count * step
+            simulator.AdvanceTo(now)
+            what = fault(model, plant_context)
+            if what is not None:
+                return f"at t = {now:.3f} s {what}"
+            if progress is not None:
+                progress(now)
+    except KeyboardInterrupt:
+        return f"interrupted at t = {context.get_time():.3f} s"
+    except (RuntimeError, SystemExit) as error:
+        return f"at t = {context.get_time():.3f} s Drake stopped: {error}"
+    return None
