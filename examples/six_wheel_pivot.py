@@ -29,7 +29,9 @@ def main() -> None:
         p_WBcm = q_xyt[:, :2] + rb.odometry.rotate(q_xyt[:, 2], p_BoBcm)
         x, y = 1e3 * np.ptp(p_WBcm, axis=0)
         print(f"{label:20}{math.degrees(q_xyt[-1, 2]):-8.2f} deg {'':19}{x:.2f} mm, {y:.2f} mm")
-    print("\nThe paper shows 3 and 2.5 mm and does not say why: an offset of the mass centre explains both.")
+    print(
+        "\nThe paper stays within 3 and 2.5 mm and does not say why. An offset of the mass centre would explain both."
+    )
 
 
 if __name__ == "__main__":

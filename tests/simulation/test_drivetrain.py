@@ -36,10 +36,19 @@ def test_one_gear_bends_the_straight_line(constant: float, amplitude: float, pha
     k, p = cycles / RADIUS, math.radians(phase_deg)
     wave = math.cos(p) * x / k - (np.sin(k * x + p) - math.sin(p)) / k**2
     expected = (0.5 * constant * x**2 + amplitude * wave) / TRACK
-    # 1 % of the largest deviation: what remains is the servos' lag, and that the cart rolls 0.05 % short.
-    assert np.abs(y - expected).max() < 0.01 * np.abs(expected).max()
+    # 2 % of the largest deviation: the servos' lag of half a millisecond shifts the wave, most of all where cos(p) = 0.
+    assert np.abs(y - expected).max() < 0.02 * np.abs(expected).max()
     # The encoders sit on the motors and saw none of it.
-    assert np.abs(recording.odometry_q_xyt[:, 1]).max() < 0.01 * np.abs(expected).max()
+    assert np.abs(recording.odometry_q_xyt[:, 1]).max() < 0.02 * np.abs(expected).max()
+
+
+def test_the_odometry_sees_no_gear_error_under_load_either() -> None:
+    """On a slope the servos droop, by a little more where the ratio is larger; the wave itself stays unseen."""
+    command = {"type": "twist", "v_xyw_B": [0.3, 0.0, 0.0]}
+    gear = {"gear_error": {"right": {"amplitude": 0.1}}}
+    recording = _run(gear, command=command, duration=10.0, ground={"slope_deg": 10.0})
+    assert np.abs(recording.odometry_q_xyt[:, 2]).max() < math.radians(0.05)
+    assert np.abs(recording.q_xyt[:, 2]).max() > math.radians(1.0)
 
 
 def test_the_same_gears_on_both_sides_only_stretch_the_line(exact: rb.Recording) -> None:

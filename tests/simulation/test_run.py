@@ -46,6 +46,7 @@ def test_the_folder_is_complete(folder: Path) -> None:
         "figures/pose_error.svg",
         "figures/wheel_speeds.svg",
         "figures/wheel_slip.svg",
+        "figures/error_budget.svg",
     }
     assert not list(folder.parent.glob(".*"))
 
@@ -241,7 +242,7 @@ def test_a_state_that_is_not_finite_fails(monkeypatch: pytest.MonkeyPatch) -> No
                 state = context.get_mutable_discrete_state_vector()
                 state.SetFromVector(np.full(state.size(), np.nan))
 
-    monkeypatch.setattr("rollerbench.simulation.runner.Simulator", Poisoned)
+    monkeypatch.setattr("rollerbench.simulation.drake_engine.Simulator", Poisoned)
     with pytest.raises(rb.SimulationError, match="not finite") as caught:
         rb.run(TURNING, save=False)
     recording = caught.value.result.recording
@@ -289,6 +290,18 @@ def test_the_station_takes_a_twist_from_outside() -> None:
     assert station.GetOutputPort("q_xyt").Eval(context) == pytest.approx([1.0, 2.1, math.pi / 2], abs=1e-3)
     assert station.GetOutputPort("v_xyw_B").Eval(context) == pytest.approx([0.1, 0, 0], abs=1e-3)
     assert station.GetOutputPort("wheel_speeds").Eval(context) == pytest.approx([0.1 / 0.0475] * 4, rel=1e-3)
+
+
+def test_a_station_starts_on_its_wheels() -> None:
+    from pydrake.systems.analysis import Simulator
+
+    station = rb.build_station("youbot_plus_x", command="external")
+    simulator = Simulator(station)
+    context = simulator.get_mutable_context()
+    station.GetInputPort("v_xyw_B").FixValue(context, [0.2, 0.0, 0.0])
+    simulator.AdvanceTo(1.0)
+    # 5 mm: it starts from rest with its wheels at full speed.
+    assert station.GetOutputPort("q_xyt").Eval(context) == pytest.approx([0.2, 0.0, 0.0], abs=5e-3)
 
 
 def test_two_robots_share_a_users_plant() -> None:

@@ -44,24 +44,24 @@ def _simulated(drives: list[WheelDrive], inputs: dict[str, Any]) -> tuple[Any, A
 def test_the_system_is_its_equations() -> None:
     random = np.random.default_rng(1)
     command = random.uniform(-8, 8, (400, len(DRIVES)))
-    # The true shafts are anywhere, not where they were commanded: the wheel angles are those that belong to them.
+    # The shafts are anywhere, not where they were commanded: the wheel angles are those that belong to them.
     shafts = random.uniform(-8, 8, (400, len(DRIVES)))
     angles = np.column_stack([drive.wheel_angle(s) for drive, s in zip(DRIVES, shafts.T, strict=True)])
     servo, measured = _simulated(DRIVES, {"wheel_speed_command": command, "wheel_angles": angles})
     for column, drive in enumerate(DRIVES):
-        lead, shaft, before = 0.0, 0.0, 0.0
-        for step, (u, true_shaft) in enumerate(zip(command[:, column], shafts[:, column], strict=True)):
+        lead, before = 0.0, 0.0
+        for step, (u, shaft) in enumerate(zip(command[:, column], shafts[:, column], strict=True)):
             moved = np.clip(lead + u * DT, -drive.backlash / 2, drive.backlash / 2)
             turned = shaft + u * DT - (moved - lead)
             expected = (drive.wheel_angle(turned) - drive.wheel_angle(shaft)) / DT
             assert servo[step, column] == pytest.approx(expected, abs=1e-10)
-            motor = true_shaft + lead
+            motor = shaft + lead
             seen = (motor, before)
             if drive.counts is not None:
                 count = 2 * math.pi / drive.counts
                 seen = tuple(count * math.floor(angle / count + 0.5) for angle in seen)
             assert measured[step, column] == pytest.approx((seen[0] - seen[1]) / DT, abs=1e-9)
-            lead, shaft, before = moved, turned, motor
+            lead, before = moved, motor
 
 
 def test_a_perfect_drivetrain_changes_nothing() -> None:
@@ -91,6 +91,11 @@ def test_measurements_need_no_command() -> None:
     assert not system.HasDirectFeedthrough(command, measured)
 
 
-def test_a_bad_time_step_is_refused() -> None:
+def test_impossible_drivetrains_are_refused() -> None:
     with pytest.raises(rb.KinematicsError, match="time_step = 0"):
         Drivetrain(DRIVES, 0)
+    with pytest.raises(rb.KinematicsError, match="drives is empty"):
+        Drivetrain([], DT)
+    for bad in ({"amplitude": 1.2}, {"constant": -1.0}, {"counts": 0}, {"cycles": 0.0}, {"backlash": -0.1}):
+        with pytest.raises(rb.KinematicsError, match=f"{next(iter(bad))} = .*accepted"):
+            WheelDrive(**bad)

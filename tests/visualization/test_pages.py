@@ -59,7 +59,7 @@ def test_the_report_reads_on_phone_and_desk(folder: Path, width: int) -> None:
     with opened(folder / "report.html", width=width) as watched:
         assert watched.requests == []
         assert watched.errors == []
-        assert watched.page.locator("figure svg").count() == 4
+        assert watched.page.locator("figure svg").count() == 5
         assert "Position error" in watched.page.inner_text("body")
         overflow = watched.page.evaluate("document.documentElement.scrollWidth - window.innerWidth")
         assert overflow <= 0

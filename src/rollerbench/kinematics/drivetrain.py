@@ -6,6 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rollerbench.errors import KinematicsError
+
 Array = NDArray[np.float64]
 
 
@@ -31,6 +33,22 @@ class WheelDrive:
     phase: float = 0.0
     backlash: float = 0.0
     counts: int | None = None
+
+    def __post_init__(self) -> None:
+        """Checks that the wheel follows its motor.
+
+        Raises:
+            KinematicsError: it does not, or a number is not of its kind.
+        """
+        if not abs(self.amplitude) < 1 + self.constant:
+            raise KinematicsError(
+                f"constant = {self.constant}, amplitude = {self.amplitude}: accepted: |amplitude| < 1 + constant"
+            )
+        if not (self.cycles > 0 and self.backlash >= 0 and (self.counts is None or self.counts > 0)):
+            raise KinematicsError(
+                f"cycles = {self.cycles}, backlash = {self.backlash}, counts = {self.counts}: "
+                "accepted: cycles > 0, backlash >= 0, counts > 0 or None"
+            )
 
     def wheel_angle(self, shaft_angle: ArrayLike) -> Array:
         """Angles (...,) of the wheel at angles (...,) of the shaft: (1 + constant) s plus the wave's integral [rad]."""

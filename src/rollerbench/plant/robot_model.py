@@ -158,7 +158,7 @@ def add_robot(
     *,
     gains: ServoGains | None = None,
 ) -> RobotModel:
-    """Adds a robot with all its rollers to a plant that is not finalized, servo gains set.
+    """Adds a robot with all its rollers to a plant that is not finalized, standing on z = 0, servo gains set.
 
     Args:
         plant: The plant.
@@ -172,6 +172,8 @@ def add_robot(
     model = RobotModel(
         robot=robot, plant=plant, model_instance=instance, body=plant.GetBodyByName(names.BODY, instance)
     )
+    standing = RigidTransform([0.0, 0.0, -robot.ground_height - static_penetration(robot)])
+    plant.SetDefaultFloatingBaseBodyPose(model.body, standing)
     gains = gains or servo_gains(robot)
     for wheel in robot.driven_wheels:
         actuator = plant.GetJointActuatorByName(names.drive_joint(wheel.name), instance)

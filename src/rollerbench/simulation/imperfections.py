@@ -1,6 +1,7 @@
 """What differs from robot.yaml in the simulated robot; the controller keeps believing robot.yaml."""
 
 import math
+import warnings
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Self
 
@@ -12,7 +13,7 @@ from rollerbench.description import Robot
 from rollerbench.description.files import validate
 from rollerbench.description.part import NonNegative, Number, Part, Positive, PositiveInt, Vector3
 from rollerbench.description.problems import Problem
-from rollerbench.errors import DescriptionError
+from rollerbench.errors import DescriptionError, RollerbenchWarning
 from rollerbench.kinematics.bumps import Bumps, scattered_caps
 from rollerbench.kinematics.drivetrain import WheelDrive
 
@@ -30,6 +31,9 @@ LARGEST_BACKLASH_DEG = 90.0
 MOST_COUNTS = 10**7
 MOST_BUMPS = 2000
 """The time of a plant's step grows with their square where they lie close together: 0.2 s for a thousand on 0.5 m2."""
+
+FLATTEST = 1e-4
+"""Least height of a bump over its width: flatter ones are spheres too large to compute with [-]."""
 
 LOW_BUMP = 0.25
 """Largest height of a bump over the radius of the smallest wheel [-]."""
@@ -77,8 +81,9 @@ class GroundBumps(Part):
 
     @model_validator(mode="after")
     def _is_flat(self) -> Self:
-        if self.height >= 0.5 * self.width:
-            raise ValueError(f"height = {self.height:g}: accepted: less than half of width = {self.width:g}")
+        low, high = FLATTEST * self.width, 0.5 * self.width
+        if not low <= self.height < high:
+            raise ValueError(f"height = {self.height:g}: accepted: from {low:g} to less than {high:g}, for this width")
         return self
 
     def scattered(self, robot: Robot, q_xyt: NDArray[np.float64], seed: int) -> Bumps:
@@ -98,9 +103,18 @@ class GroundBumps(Part):
             raise DescriptionError(str(Problem(("errors", "ground_bumps", "density"), message, self.density)))
         # Where the wheels stand at the start: the first reference pose is the origin.
         standing = robot.contact_points_B[:, :2]
-        return scattered_caps(
+        bumps = scattered_caps(
             low, high, count=count, height=self.height, width=self.width, clear_of=standing, seed=seed
         )
+        if not len(bumps.radii):
+            warnings.warn(
+                f"errors.ground_bumps: the ground stays flat: density = {self.density:g} makes {count} bumps on the "
+                f"{area:.3g} m2 around the reference path, and none is farther than width = {self.width:g} m from "
+                "where the wheels stand at the start",
+                RollerbenchWarning,
+                stacklevel=2,
+            )
+        return bumps
 
 
 class Errors(Part):

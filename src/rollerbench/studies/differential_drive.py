@@ -109,11 +109,7 @@ def _equations(robot: Robot) -> Part:
     for theta in np.radians(np.arange(0, 360, 15)):
         to_world = np.eye(3)
         to_world[:2, :2] = rotate(theta, np.eye(2)).T
-        j1 = np.array([
-            [math.cos(theta - gamma) / math.cos(gamma), math.cos(theta + gamma) / math.cos(gamma)],
-            [math.sin(theta - gamma) / math.cos(gamma), math.sin(theta + gamma) / math.cos(gamma)],
-            [-1 / (length * math.cos(gamma)), 1 / (length * math.cos(gamma))],
-        ])  # fmt: skip
+        j1 = _j1(theta, length, gamma)
         worst_8 = max(worst_8, np.abs(r / 2 * j1 - to_world @ kinematics.forward_matrix).max())
         j2 = np.array([[math.cos(theta), math.sin(theta), s * length * math.cos(gamma)] for s in (-1, 1)])
         worst_9 = max(worst_9, np.abs(j2 / r - kinematics.drive_matrix @ to_world.T).max())
@@ -123,6 +119,16 @@ def _equations(robot: Robot) -> Part:
         Result(item="Equation (9)", quantity="largest difference from the general wheel equation", unit="-",
                theory=float(worst_9)),
     ], []  # fmt: skip
+
+
+def _j1(theta: float, length: float, gamma: float) -> Array:
+    """J1 (3, 2) of equation (8)."""
+    rows = [
+        [math.cos(theta - gamma), math.cos(theta + gamma)],
+        [math.sin(theta - gamma), math.sin(theta + gamma)],
+        [-1 / length, 1 / length],
+    ]
+    return np.array(rows) / math.cos(gamma)
 
 
 def _straight(run: RunResult) -> Part:
@@ -174,7 +180,7 @@ def _smallest_radius(robot: Robot, runs: Mapping[str, RunResult]) -> Part:
         twist = WheelKinematics(run.scenario.robot).at([offset(run.scenario.robot), 0.0]).forward([-1.0, 1.0])
         results += [
             Result(item="Section 3.3", quantity=f"R_min at gamma = {gamma} deg", unit="m",
-                   printed=b * math.tan(math.radians(gamma)), theory=float(np.hypot(*twist[:2]) / abs(twist[2])),
+                   theory=float(np.hypot(*twist[:2]) / abs(twist[2])),
                    simulated=radius),
         ]  # fmt: skip
     fine = np.linspace(0.0, 35.0, 71)
@@ -209,7 +215,7 @@ def _gears(robot: Robot, runs: Mapping[str, RunResult]) -> Part:
                 Result(item=item, quantity="drift after 3 m", unit="mm",
                        theory=float(1e3 * theory[-1]), simulated=float(1e3 * y[-1])),
                 Result(item=item, quantity="height of the wave on it", unit="mm",
-                       theory=_wave(x, theory), simulated=_wave(x, y)),
+                       theory=_wave(robot, run, x, theory), simulated=_wave(robot, run, x, y)),
             ]  # fmt: skip
         lines = [
             Curve(label="formula", x=x, y=1e3 * theory),
@@ -229,7 +235,7 @@ def _other_causes(robot: Robot, runs: Mapping[str, RunResult]) -> Part:
     results.append(Result(item="Section 4", quantity="radius of the path, right tyre 0.5 % larger", unit="m",
                           theory=bend, simulated=circle_radius(run.recording.q_xyt[:, :2])))  # fmt: skip
     run = runs["cart_slip"]
-    results.append(Result(item="Section 4", quantity="yaw after a hard start and stop, right tyre on a wet patch",
+    results.append(Result(item="Section 4", quantity="yaw on a wet patch, hard start and stop; theory: by its slip",
                           unit="deg", theory=math.degrees(_yaw_from_slip(run)),
                           simulated=math.degrees(run.recording.q_xyt[-1, 2])))  # fmt: skip
     run = runs["cart_backlash"]
@@ -265,6 +271,7 @@ def _mistakes(robot: Robot, runs: Mapping[str, RunResult]) -> tuple[Mistake, ...
         return float(np.abs(kinematics.skid_speeds([*in_body, -speed / radius])[:2]).max())
 
     right = speeds(theta - alpha)
+    ratio, motors, j1 = robot.wheels[0].gear_ratio, np.full(2, 20.0), _j1(theta, length, gamma)
     ahead = radius * math.cos(theta + alpha)
     printed_14 = (ahead + length * math.cos(theta + gamma)) / (ahead - length * math.cos(theta - gamma))
     common, phase = runs["cart_gear_common"], runs["cart_gear_phase"]
@@ -295,8 +302,11 @@ def _mistakes(robot: Robot, runs: Mapping[str, RunResult]) -> tuple[Mistake, ...
             claim="The second term is (di / 2) J1 phi'.",
             correction="It lacks the wheel radius r: (di r / 2) J1 phi'.",
             proof={
-                "speed that a ratio error of 1 % adds at a wheel speed of 1 rad/s, as printed": (0.01, "m/s"),
-                "by (8) with i (1 + 1 %)": (0.01 * r, "m/s"),
+                "first entry of the second term, di = 1 % of i, motors at 20 rad/s, as printed": (
+                    float(0.5 * 0.01 * ratio * j1[0] @ motors), "rad/s"),
+                "what that di adds to x' in (8), the difference of two evaluations": (
+                    float(0.5 * r * (1.01 * ratio - ratio) * j1[0] @ motors), "m/s"),
+                "the printed term times r": (float(0.5 * r * 0.01 * ratio * j1[0] @ motors), "m/s"),
             },
         ),
         Mistake(
@@ -349,9 +359,12 @@ def circle_radius(path: Array) -> float:
     return math.sqrt(max(0.0, c + a**2 + b**2))
 
 
-def _wave(x: Array, y: Array) -> float:
-    """Height of the wave on a parabola [mm]."""
-    return float(1e3 * np.ptp(y - np.polyval(np.polyfit(x, y, 2), x)))
+def _wave(robot: Robot, run: RunResult, x: Array, y: Array) -> float:
+    """Height of the gear's wave on a path y(x), apart from a parabola [mm]."""
+    phase = run.scenario.errors.gear_error["right"].cycles / robot.wheels[1].radius * x
+    matrix = np.column_stack([np.ones_like(x), x, x**2, np.sin(phase), np.cos(phase)])
+    *_, sine, cosine = np.linalg.lstsq(matrix, y, rcond=None)[0]
+    return float(2e3 * np.hypot(sine, cosine))
 
 
 def _yaw_from_slip(run: RunResult) -> float:

@@ -2,7 +2,7 @@
 
 import json
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -63,7 +63,10 @@ def reproduce(
     if paper not in PAPERS:
         raise ResourceError(f"no paper '{paper}'; accepted: {', '.join(PAPERS)}")
     folder, chosen = Path(output), PAPERS[paper]
-    _check(folder)
+    earlier = _check(folder)
+    # The page of an earlier reproduction does not belong to the runs that are about to replace its runs.
+    for name in ("report.html", "results.json"):
+        (folder / name).unlink(missing_ok=True)
     scenarios = chosen.scenarios()
     total, before = sum(scenario.duration for scenario in scenarios.values()), 0.0
     runs = {}
@@ -74,7 +77,10 @@ def reproduce(
         runs[name] = run(scenario, output=folder / "runs" / name, progress=shown)
         before += scenario.duration
     findings = chosen.evaluate(runs)
-    _write(folder, chosen, findings, runs)
+    try:
+        _write(folder, chosen, findings, runs, earlier)
+    except OSError as error:
+        raise ResourceError(f"{folder}: cannot be written: {error}") from error
     return Reproduction(paper=chosen, findings=findings, runs=runs, folder=folder)
 
 
@@ -82,32 +88,44 @@ def _shifted(progress: Progress, name: str, before: float, total: float) -> Call
     return lambda now: progress(before + now, name, total)
 
 
-def _check(folder: Path) -> None:
+def _check(folder: Path) -> set[str]:
+    """Checks that a reproduction may be written there; returns the names of an earlier one's figures."""
     accepted = "accepted: a new folder, or that of an earlier reproduction"
     if folder.exists() and not folder.is_dir():
         raise ResourceError(f"{folder}: is a file; {accepted}")
     foreign = sorted({path.name for path in folder.iterdir()} - FILES) if folder.is_dir() else []
     if foreign:
         raise ResourceError(f"{folder}: holds something else ({', '.join(foreign[:3])}); {accepted}")
+    for name in FILES:
+        path, is_folder = folder / name, name in ("figures", "runs")
+        if path.exists() and path.is_dir() != is_folder:
+            raise ResourceError(f"{path}: is {'a file' if is_folder else 'a folder'}; {accepted}")
     try:
         folder.mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=folder).close()
+        earlier = json.loads((folder / "results.json").read_text(encoding="utf-8"))["figures"]
+        return {name for name in earlier if isinstance(name, str)}
+    except (FileNotFoundError, ValueError, KeyError, TypeError):
+        return set()
     except OSError as error:
         raise ResourceError(f"{folder}: cannot be written: {error}") from error
 
 
-def _write(folder: Path, paper: Paper, findings: Findings, runs: Mapping[str, RunResult]) -> None:
+def _write(
+    folder: Path, paper: Paper, findings: Findings, runs: Mapping[str, RunResult], earlier: Collection[str]
+) -> None:
     (folder / "figures").mkdir(exist_ok=True)
     drawn = {f"{picture.name}.svg": picture.svg for picture in findings.pictures}
     for name, svg in drawn.items():
         write_atomically(folder / "figures" / name, svg)
     for old in (folder / "figures").glob("*.svg"):
-        if old.name not in drawn:
+        if old.name in earlier and old.name not in drawn:
             old.unlink()
     results = {
         "paper": paper.name,
         "citation": paper.citation,
         "versions": versions(),
+        "figures": sorted(drawn),
         "results": [result.to_dict() for result in findings.results],
         "mistakes": [mistake.to_dict() for mistake in findings.mistakes],
         "runs": {name: result.summary for name, result in runs.items()},

@@ -16,13 +16,12 @@ from rollerbench.kinematics.drivetrain import WheelDrive
 class Drivetrain(Diagram):
     """What stands between the commanded wheel speeds, the wheels' servos, and the measured wheel speeds.
 
-    Once a time step dt, with the command u, the play b, the motor's lead g over its shaft in [-b/2, b/2], the shaft's
-    angle s, and the wheel's angle Theta(s) (`WheelDrive.wheel_angle`):
+    Once a time step dt, with the command u, the play b, the motor's lead g over its shaft in [-b/2, b/2], and the
+    shaft's angle s from that of the wheel, Theta(s) (`WheelDrive.wheel_angle`):
 
-        g_next = clip(g + u dt, -b/2, b/2)            the shaft stands while its motor crosses the play
-        s_next = s + u dt - (g_next - g)
-        servo = (Theta(s_next) - Theta(s)) / dt
-        motor = inverse of Theta(wheel's angle) + g   where the motor is, seen at the wheel
+        g_next = clip(g + u dt, -b/2, b/2)                      the shaft stands while its motor crosses the play
+        servo = (Theta(s + u dt - (g_next - g)) - Theta(s)) / dt
+        motor = s + g                                           where the motor is, seen at the wheel
         measured = (motor - motor before) / dt, each rounded to whole counts if there is an encoder
 
     Input ports:
@@ -38,64 +37,77 @@ class Drivetrain(Diagram):
         """Builds the diagram.
 
         Args:
-            drives: Drivetrains of the n wheels.
+            drives: Drivetrains of the n wheels, at least one.
             time_step: Period of the updates: the plant's [s].
         """
         super().__init__()
         if not (math.isfinite(time_step) and time_step > 0):
             raise KinematicsError(f"time_step = {time_step}: accepted: a positive number of seconds")
+        if not drives:
+            raise KinematicsError("drives is empty: accepted: one for each driven wheel, at least one")
         n = len(drives)
         builder = DiagramBuilder()
         play = builder.AddNamedSystem("play", _play(drives, time_step))
+        shaft = builder.AddNamedSystem("shaft", _shaft(drives))
         gear = builder.AddNamedSystem("gear", _gear(drives, time_step))
         encoder = builder.AddNamedSystem("encoder", _encoder(drives, time_step))
-        ports = []
-        for name, system in (("wheel_speed_command", gear), ("wheel_angles", encoder)):
-            inputs = builder.AddNamedSystem(f"into_{system.get_name()}", Multiplexer([n, 2 * n]))
+        into_gear = builder.AddNamedSystem("into_gear", Multiplexer([n, n, n]))
+        into_encoder = builder.AddNamedSystem("into_encoder", Multiplexer([n, n]))
+        command = builder.ExportInput(play.get_input_port(), "wheel_speed_command")
+        builder.ExportInput(shaft.get_input_port(), "wheel_angles")
+        builder.ConnectInput(command, into_gear.get_input_port(2))
+        for inputs, system in ((into_gear, gear), (into_encoder, encoder)):
+            builder.Connect(shaft.get_output_port(), inputs.get_input_port(0))
             builder.Connect(play.get_output_port(), inputs.get_input_port(1))
             builder.Connect(inputs.get_output_port(), system.get_input_port())
-            ports.append(builder.ExportInput(inputs.get_input_port(0), name))
-        builder.ConnectInput(ports[0], play.get_input_port())
         builder.ExportOutput(gear.get_output_port(), "servo_wheel_speeds")
         builder.ExportOutput(encoder.get_output_port(), "measured_wheel_speeds")
         builder.BuildInto(self)
 
 
 def _play(drives: Sequence[WheelDrive], time_step: float) -> SymbolicVectorSystem:
-    """From the commands to [leads g; shaft angles s]."""
-    leads, shafts, commands = (_variables(name, len(drives)) for name in ("lead", "shaft", "command"))
+    """From the commands to the leads g."""
+    leads, commands = (_variables(name, len(drives)) for name in ("lead", "command"))
     crossings = [_crossing(*each, time_step) for each in zip(drives, leads, commands, strict=True)]
-    turns = [time_step * command - crossing for command, crossing in zip(commands, crossings, strict=True)]
     return SymbolicVectorSystem(
-        state=[*leads, *shafts],
+        state=leads,
         input=commands,
-        dynamics=[now + step for now, step in zip([*leads, *shafts], [*crossings, *turns], strict=True)],
-        output=[Expression(variable) for variable in (*leads, *shafts)],
+        dynamics=[lead + crossing for lead, crossing in zip(leads, crossings, strict=True)],
+        output=[Expression(lead) for lead in leads],
         time_period=time_step,
     )
 
 
+def _shaft(drives: Sequence[WheelDrive]) -> SymbolicVectorSystem:
+    """From the wheels' angles to the shafts'."""
+    angles = _variables("angle", len(drives))
+    return SymbolicVectorSystem(
+        input=angles, output=[_shaft_angle(drive, angle) for drive, angle in zip(drives, angles, strict=True)]
+    )
+
+
 def _gear(drives: Sequence[WheelDrive], time_step: float) -> SymbolicVectorSystem:
-    """From [commands; leads; shaft angles] to the speeds of the servos."""
-    commands, leads, shafts = (_variables(name, len(drives)) for name in ("command", "lead", "shaft"))
+    """From [shaft angles; leads; commands] to the speeds of the servos."""
+    shafts, leads, commands = (_variables(name, len(drives)) for name in ("shaft", "lead", "command"))
     speeds = []
-    for drive, command, lead, shaft in zip(drives, commands, leads, shafts, strict=True):
+    for drive, shaft, lead, command in zip(drives, shafts, leads, commands, strict=True):
         turn = time_step * command - _crossing(drive, lead, command, time_step)
         wave = _cosine(drive, shaft + turn) - _cosine(drive, shaft)
         speeds.append(((1 + drive.constant) * turn - drive.amplitude / drive.cycles * wave) / time_step)
-    return SymbolicVectorSystem(input=[*commands, *leads, *shafts], output=speeds)
+    return SymbolicVectorSystem(input=[*shafts, *leads, *commands], output=speeds)
 
 
 def _encoder(drives: Sequence[WheelDrive], time_step: float) -> SymbolicVectorSystem:
-    """From [wheel angles; leads; shaft angles] to the measured speeds; its state is where the motors were."""
-    before, angles, leads, shafts = (_variables(name, len(drives)) for name in ("before", "angle", "lead", "shaft"))
+    """From [shaft angles; leads] to the measured speeds; its state is where the motors were."""
+    before, shafts, leads = (_variables(name, len(drives)) for name in ("before", "shaft", "lead"))
     dynamics, output = [], []
-    for drive, last, angle, lead in zip(drives, before, angles, leads, strict=True):
-        now = _shaft_angle(drive, angle) + lead
+    for drive, last, shaft, lead in zip(drives, before, shafts, leads, strict=True):
+        now = shaft + lead
         dynamics.append(now)
         output.append((_counted(drive, now) - _counted(drive, last)) / time_step)
-    inputs = [*angles, *leads, *shafts]
-    return SymbolicVectorSystem(state=before, input=inputs, dynamics=dynamics, output=output, time_period=time_step)
+    return SymbolicVectorSystem(
+        state=before, input=[*shafts, *leads], dynamics=dynamics, output=output, time_period=time_step
+    )
 
 
 def _crossing(drive: WheelDrive, lead: Variable, command: Variable, time_step: float) -> Expression:
@@ -106,7 +118,7 @@ def _crossing(drive: WheelDrive, lead: Variable, command: Variable, time_step: f
 
 def _shaft_angle(drive: WheelDrive, wheel_angle: Variable) -> Expression:
     """Inverse of `WheelDrive.wheel_angle` in symbols, by its fixed point; |amplitude| < 1 + constant contracts."""
-    shaft = wheel_angle / (1 + drive.constant)
+    shaft = Expression(wheel_angle) / (1 + drive.constant)
     for _ in range(drive.iterations):
         wave = drive.amplitude / drive.cycles * (_cosine(drive, shaft) - math.cos(drive.phase))
         shaft = (wheel_angle + wave) / (1 + drive.constant)
