@@ -38,6 +38,11 @@ def finite_roller_slope(wheel: AnyWheel) -> float:
 
     At constant q' and w = 0, vy is proportional to cos(theta), whose mean over the pitch is sin(pi/N)/(pi/N): the wheel
     acts like one with tan(gamma_eff) = tan(gamma) sin(pi/N)/(pi/N). Omni wheels (gamma = 90 deg) and tyres stay.
+
+    In a turn the same mean takes the term in w away, as tan(theta) is odd, and leaves longer lever arms: K + L becomes
+    K + L / (sin(pi/N)/(pi/N)). That is a law only where the terms in w of all wheels are small or agree: those of left
+    and right wheels contradict each other by (R - r)/(K + L), wheels must slip, and friction and servos decide by how
+    much (models/mecanum_platform/README.md has numbers).
     """
     if not isinstance(wheel, RollerWheel):
         return 0.0

@@ -35,10 +35,10 @@ def half_step_row(change: Mapping[str, float]) -> tuple[str, ...]:
 def _row(name: str, part: Mapping[str, Any], meaning: str) -> tuple[str, ...]:
     return (
         name,
-        f"{1e3 * part['along_track']:.3f}",
-        f"{1e3 * part['cross_track']:.3f}",
+        _fixed(1e3 * part["along_track"], 3),
+        _fixed(1e3 * part["cross_track"], 3),
         _percent(part["position_share"]),
-        f"{math.degrees(part['yaw']):.4f}",
+        _fixed(math.degrees(part["yaw"]), 4),
         _percent(part["yaw_share"]),
         meaning,
     )
@@ -50,7 +50,12 @@ def _sum(shares: list[float | None]) -> float | None:
 
 
 def _percent(share: float | None) -> str:
-    return "-" if share is None else f"{100 * share:.1f} %"
+    return "-" if share is None else f"{_fixed(100 * share, 1)} %"
+
+
+def _fixed(value: float, digits: int) -> str:
+    # Adding 0.0 turns -0 into 0.
+    return f"{round(value, digits) + 0.0:.{digits}f}"
 
 
 def budgets(summary: Mapping[str, Any]) -> dict[str, list[tuple[str, ...]]]:

@@ -10,6 +10,10 @@ from rollerbench.recording import Recording
 from rollerbench.report.drawing import COLORS, STYLES, new_figure, svg_text
 
 
+NOTHING = 1e-3
+"""Errors that are smaller are drawn as none [mm, deg]."""
+
+
 def run_figures(recording: Recording) -> dict[str, str]:
     """SVG texts of a run's figures by name."""
     return {
@@ -89,6 +93,9 @@ def error_budget(recording: Recording) -> str:
             axes.plot(recording.time, scale * part[:, index], style, color=color, label=name, linewidth=1.3)
         axes.plot(recording.time, scale * budget.total[:, index], color="0.2", label="pose error", linewidth=0.8)
         axes.set_ylabel(label)
+        if np.ptp(scale * budget.total[:, index]) < NOTHING:
+            # Rounding errors shall look like none.
+            axes.set_ylim(-NOTHING, NOTHING)
     rows[0].legend()
     rows[-1].set_xlabel("time [s]")
     return svg_text(figure)
