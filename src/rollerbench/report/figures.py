@@ -9,7 +9,6 @@ from rollerbench import analysis
 from rollerbench.recording import Recording
 from rollerbench.report.drawing import COLORS, STYLES, new_figure, svg_text
 
-
 NOTHING = 1e-3
 """Errors that are smaller are drawn as none [mm, deg]."""
 
