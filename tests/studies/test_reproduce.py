@@ -120,8 +120,9 @@ def test_differential_drive(tmp_path: Path) -> None:
         assert result.simulated == pytest.approx(result.theory, rel=2e-3)
     for result in rows(done, "Section 3.3"):
         gamma = math.radians(float(re.findall(r"(\d+) deg", result.quantity)[0]))
-        assert result.theory == pytest.approx(0.2 * math.tan(gamma), rel=1e-9)
-        assert result.simulated == pytest.approx(result.theory, rel=0.01)
+        assert result.theory == pytest.approx(0.2 * math.tan(gamma), rel=1e-9, abs=1e-12)
+        # A turn about C leaves it within a tenth of a millimetre.
+        assert result.simulated == pytest.approx(result.theory, rel=0.01, abs=1e-4)
     for result in (*rows(done, "Figure 7", "wave"), *rows(done, "Figure 8", "wave")):
         assert result.theory == pytest.approx(2e3 * 0.03 / (0.4 * 10**2), rel=1e-3)
     assert row(done, "Figure 8", "drift").theory == pytest.approx(57.0, abs=0.1)
@@ -208,7 +209,7 @@ def test_gear_path_is_the_double_integral_of_the_gear_error() -> None:
     assert gear_path(x, **error, track=track) == pytest.approx(y, abs=1e-8)
 
 
-@pytest.mark.parametrize("gamma_deg", [5, 20, 30])
+@pytest.mark.parametrize("gamma_deg", [0, 5, 20, 30])
 def test_the_mass_is_where_gamma_says(gamma_deg: float) -> None:
     robot = with_gamma(rb.load_robot("differential_cart"), math.radians(gamma_deg))
     assert offset(robot) == pytest.approx(half_track(robot) * math.tan(math.radians(gamma_deg)), abs=1e-12)

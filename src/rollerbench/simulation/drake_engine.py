@@ -15,14 +15,8 @@ from rollerbench.simulation.drake_config import simulator_config
 from rollerbench.simulation.log import Progress, Simulated, provenance, recording_of, station_samples
 from rollerbench.simulation.scenario import Scenario
 from rollerbench.simulation.station import Station
-from rollerbench.simulation.watch import fault
+from rollerbench.simulation.watch import CHUNK, SETTLE_TIME, fault
 from rollerbench.visualization.scene import dress_scene
-
-SETTLE_TIME = 0.25
-"""Time that the robot stands still, in a simulation of its own, to find how it rests on its wheels [s]."""
-
-CHUNK = 0.05
-"""Simulated time between two looks at the robot [s]."""
 
 
 def simulate(scenario: Scenario, *, meshcat: Meshcat | None = None, progress: Progress | None = None) -> Simulated:

@@ -17,15 +17,9 @@ from rollerbench.sdf.contact import GRAVITY
 from rollerbench.sdf.mjcf import DEFAULT_STEP, robot_to_mjcf
 from rollerbench.simulation.log import Progress, Samples, Simulated, odometry_poses, provenance, recording_of
 from rollerbench.simulation.scenario import Scenario
-from rollerbench.simulation.watch import NOT_FINITE, wrong_pose
+from rollerbench.simulation.watch import CHUNK, NOT_FINITE, SETTLE_TIME, wrong_pose
 
 Array = NDArray[np.float64]
-
-SETTLE_TIME = 0.25
-"""Time that the robot stands still to find how it rests on its wheels [s]."""
-
-CHUNK = 0.05
-"""Simulated time between two looks at the robot [s]."""
 
 
 def check(scenario: Scenario) -> None:

@@ -1,4 +1,4 @@
-"""Notices when a simulation has left reality."""
+"""Lets robots settle, and notices when a simulation has left reality."""
 
 import math
 
@@ -11,6 +11,12 @@ from rollerbench.plant import RobotModel
 from rollerbench.sdf.contact import static_penetration
 
 Array = NDArray[np.float64]
+
+SETTLE_TIME = 0.25
+"""Time that a robot stands still before a run, to find how it rests on its wheels [s]."""
+
+CHUNK = 0.05
+"""Simulated time between two looks at a robot [s]."""
 
 NOT_FINITE = "the state is not finite (NaN or infinite): accepted: a smaller plant.time_step"
 

@@ -19,8 +19,8 @@ Array = NDArray[np.float64]
 RADII = (0.15, 0.3, 0.6, 1.2)
 """Radii of the arcs of C [m]."""
 
-GAMMAS_DEG = (5, 10, 20, 30)
-"""Angles gamma at which turns about Bo are simulated [deg]; at 0 the cart would stand on the brink of tipping over."""
+GAMMAS_DEG = (0, 10, 20, 30)
+"""Angles gamma at which turns about Bo are simulated [deg]; at 0 they are turns about C."""
 
 GEARS = ("ripple", "drift", "phase", "common")
 
@@ -56,9 +56,17 @@ def half_track(robot: Robot) -> float:
 
 
 def with_gamma(robot: Robot, gamma: float) -> Robot:
-    """The cart with its body's mass moved so that C lies l sin(gamma) ahead of the axle [rad]."""
+    """The cart with its body's mass moved so that C lies l sin(gamma) ahead of the axle [rad].
+
+    With C over the axle it would stand on the brink of tipping over, so that it gets a second castor behind.
+    """
     data = robot.model_dump(mode="json", exclude_none=True)
     data["body"]["center"] = list(robot.body.box_center)
+    if gamma == 0.0:
+        castor = dict(data["wheels"][-1])
+        x, y, z = castor["position"]
+        data["wheels"].append({**castor, "name": "rear_castor", "position": [-x, y, z]})
+        robot = load_robot(data)
     shift = half_track(robot) * math.tan(gamma) - offset(robot)
     data["body"]["center_of_mass"][0] += shift * robot.mass / robot.body.mass
     return load_robot(data)
@@ -176,10 +184,11 @@ def _smallest_radius(robot: Robot, runs: Mapping[str, RunResult]) -> Part:
         run = runs[f"turn_gamma_{gamma}_deg"]
         radius = circle_radius(centre_path(run, "q_xyt"))
         simulated.append(radius)
+        about = ", a turn about C" if gamma == 0 else ""
         # The general equations, about C: the speed of C over the yaw rate while the wheels turn against each other.
         twist = WheelKinematics(run.scenario.robot).at([offset(run.scenario.robot), 0.0]).forward([-1.0, 1.0])
         results += [
-            Result(item="Section 3.3", quantity=f"R_min at gamma = {gamma} deg", unit="m",
+            Result(item="Section 3.3", quantity=f"R_min at gamma = {gamma} deg{about}", unit="m",
                    theory=float(np.hypot(*twist[:2]) / abs(twist[2])),
                    simulated=radius),
         ]  # fmt: skip
@@ -188,7 +197,10 @@ def _smallest_radius(robot: Robot, runs: Mapping[str, RunResult]) -> Part:
         Curve(label="l sin(gamma)", x=fine, y=b * np.tan(np.radians(fine))),
         Curve(label="simulated", x=np.array(GAMMAS_DEG, dtype=float), y=np.array(simulated), style="o"),
     ]
-    caption = "Smallest radius of C over gamma, with l cos(gamma) = 0.2 m: a full turn about the middle of the axle."
+    caption = (
+        "Smallest radius of C over gamma, with l cos(gamma) = 0.2 m: a full turn about the middle of the axle. At gamma "
+        "= 0, and only there, it is a turn about C itself; the cart then has a second castor behind, or it would tip over."
+    )
     svg = curves("gamma [deg]", {"R_min [m]": lines})
     return results, [Picture(name="smallest_radius", title="Section 3.3.", caption=caption, svg=svg)]
 
