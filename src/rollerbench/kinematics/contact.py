@@ -99,7 +99,9 @@ def wheel_contact(robot: Robot, wheel: AnyWheel, motion: RobotMotion, bumps: Bum
         spin = motion.roller_speeds[wheel.name][touching][:, np.newaxis]
         velocity += spin * np.cross(shapes.axes_W[touching], p_WC - shapes.centers_W[touching])
     slip = velocity - np.sum(velocity * normal_W, axis=1, keepdims=True) * normal_W
-    drive_W, rolling_radius = _drive_equation(robot, wheel, motion, shapes, places, p_WC - p_WH)
+    # A wheel in the air would roll on its lowest point, not on that point's shadow.
+    lowest = p_WC - p_WH + np.maximum(0.0, -places.depth)[:, np.newaxis] * normal_W
+    drive_W, rolling_radius = _drive_equation(robot, wheel, motion, shapes, places, lowest)
     return WheelContact(
         p_WC=p_WC,
         normal_W=normal_W,

@@ -44,6 +44,13 @@ class Profile:
         total: Array = np.diff(antiderivative + outside, axis=0)
         return total
 
+    def rate(self, time: ArrayLike) -> Array:
+        """Time derivatives (..., n) at times (...) [s]; 0 before the first break and after the last one."""
+        t = np.asarray(time, dtype=np.float64)
+        inside = (t >= self.breaks[0]) & (t <= self.breaks[-1])
+        result: Array = self._spline(np.clip(t, self.breaks[0], self.breaks[-1]), 1) * inside[..., np.newaxis]
+        return result
+
     @property
     def peak(self) -> Array:
         """Largest sizes (n,), from 16 samples a piece."""

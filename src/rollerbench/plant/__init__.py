@@ -2,6 +2,6 @@
 
 from rollerbench.plant.ground import add_ground
 from rollerbench.plant.robot_model import RobotModel, add_robot
-from rollerbench.plant.servo import ServoGains, servo_gains
+from rollerbench.sdf.servo import ServoGains, servo_gains
 
 __all__ = ["RobotModel", "ServoGains", "add_ground", "add_robot", "servo_gains"]

@@ -21,9 +21,9 @@ from pydrake.multibody.tree import (
 from pydrake.systems.framework import Context
 
 from rollerbench.description import AnyWheel, Robot, load_robot
-from rollerbench.plant.servo import ServoGains, servo_gains
 from rollerbench.sdf import names, robot_to_sdf
 from rollerbench.sdf.contact import static_penetration
+from rollerbench.sdf.servo import ServoGains, servo_gains
 
 
 @dataclass(frozen=True, kw_only=True)

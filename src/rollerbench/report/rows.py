@@ -26,19 +26,18 @@ def summary_rows(summary: Mapping[str, Any]) -> list[Row]:
         ("Real-time factor", f"{summary['realtime_factor']:.1f}, {summary['engine']}"),
     ]
     if summary["cross_check"]:
-        rows += _cross_check_rows(summary["cross_check"], summary["simulated_final_pose"])
+        rows += _cross_check_rows(summary["cross_check"])
     if summary["failure"]:
         rows.insert(0, ("Failed", summary["failure"]))
     return rows
 
 
-def _cross_check_rows(second: Mapping[str, Any], pose: list[float]) -> list[Row]:
+def _cross_check_rows(second: Mapping[str, Any]) -> list[Row]:
     """What a second engine says, and how far it ends from the first."""
-    end = second["simulated_final_pose"]
-    apart = math.dist(end[:2], pose[:2])
+    x, y, yaw = second["apart"]
     rows = [
-        (f"{second['engine']}: pose", _pose(end)),
-        ("  from this one", f"{_mm(apart)}, {_degrees(end[2] - pose[2])}"),
+        (f"{second['engine']}: pose", _pose(second["simulated_final_pose"])),
+        ("  from this one", f"{_mm(math.hypot(x, y))}, {_degrees(yaw)}"),
     ]
     return [*rows, ("  failed", second["failure"])] if second["failure"] else rows
 

@@ -1,6 +1,6 @@
 """A robot as an MJCF model for MuJoCo, on level ground, with velocity servos on its wheels."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 
 import numpy as np
 from lxml import etree
@@ -10,6 +10,7 @@ from rollerbench.description import AnyWheel, Robot, RollerWheel
 from rollerbench.description.inertia import RigidInertia
 from rollerbench.description.mass import body_inertia, fork_inertia, hub_inertia, roller_inertia, roller_poses_H
 from rollerbench.sdf import names
+from rollerbench.sdf.servo import ServoGains, servo_gains
 
 CONTACT = {"solref": "0.002 1", "solimp": "0.99 0.99 0.001"}
 """Stiff contact: a robot sinks in by a few micrometres. Time constants of two steps of 1 ms are the least."""
@@ -23,9 +24,7 @@ def robot_to_mjcf(
     *,
     friction: float = 0.8,
     gravity: Iterable[float] = (0.0, 0.0, -9.81),
-    drive_damping: Mapping[str, float] | None = None,
-    steering_stiffness: Mapping[str, float] | None = None,
-    steering_damping: Mapping[str, float] | None = None,
+    gains: ServoGains | None = None,
     time_step: float = DEFAULT_STEP,
 ) -> str:
     """The robot as MJCF text with ground at z = 0, complete in itself.
@@ -34,19 +33,24 @@ def robot_to_mjcf(
     the ground collides with them. Each driven wheel has a velocity actuator, each steered one a position actuator,
     named as their joints.
 
+    The servos are as implicit as Drake's: the torque kv (command - speed after the step) acts as that at the start of
+    the step does on a joint with h kv more armature (h^2 kp too, for a stiffness). MuJoCo's own implicit
+    integrators damp only after the contacts were solved, and let an accelerating robot run ahead of its wheels. A motor
+    at its effort limit feels that armature.
+
     Args:
         robot: The robot.
         friction: Coefficient of friction of the ground; with a wheel's it combines to 2ab/(a+b), as in Drake.
         gravity: Acceleration (3,) [m/s2].
-        drive_damping: Torque over the error of the wheel speed by wheel [N m s]; 1 for those left out.
-        steering_stiffness: Torque over the error of the steering angle by wheel [N m]; 1 for those left out.
-        steering_damping: Torque over the error of the steering speed by wheel [N m s]; 1 for those left out.
+        gains: Gains of the servos; by default those of `servo_gains(robot)`. To follow a moving angle with the damping
+            of Drake's servo, control a steered wheel's actuator by angle + rate kv / kp.
         time_step: MuJoCo's step [s].
     """
+    gains = gains or servo_gains(robot)
     root = etree.Element("mujoco", model=robot.name)
     _add(root, "compiler", angle="radian", autolimits="true", inertiafromgeom="false")
     option = _add(root, "option", timestep=_numbers([time_step]), gravity=_numbers(gravity), cone="elliptic")
-    option.set("integrator", "implicitfast")
+    option.set("integrator", "Euler")
     option.set("impratio", "100")
     _add(option, "flag", autoreset="disable")
     world = _add(root, "worldbody")
@@ -61,15 +65,14 @@ def robot_to_mjcf(
     _add_contact(box, _combined(min(wheel.friction for wheel in robot.wheels), friction))
     actuators = etree.Element("actuator")
     for wheel in robot.wheels:
-        _add_wheel(body, wheel, _combined(wheel.friction, friction))
+        _add_wheel(body, wheel, _combined(wheel.friction, friction), gains, time_step)
         if wheel.driven:
-            gain = (drive_damping or {}).get(wheel.name, 1.0)
+            gain = gains.drive_damping[wheel.name]
             motor = _add(actuators, "velocity", name=names.drive_joint(wheel.name), joint=names.drive_joint(wheel.name))
             motor.set("kv", _numbers([gain]))
             _limit(motor, wheel.max_effort)
     for wheel in robot.steered_wheels:
-        stiffness = (steering_stiffness or {}).get(wheel.name, 1.0)
-        damping = (steering_damping or {}).get(wheel.name, 1.0)
+        stiffness, damping = gains.steering_stiffness[wheel.name], gains.steering_damping[wheel.name]
         joint = names.swivel_joint(wheel.name)
         motor = _add(actuators, "position", name=joint, joint=joint, kp=_numbers([stiffness]), kv=_numbers([damping]))
         _limit(motor, getattr(wheel, "max_steering_effort", None))
@@ -78,16 +81,21 @@ def robot_to_mjcf(
     return text.decode("utf-8")
 
 
-def _add_wheel(body: etree._Element, wheel: AnyWheel, friction: float) -> None:
+def _add_wheel(body: etree._Element, wheel: AnyWheel, friction: float, gains: ServoGains, time_step: float) -> None:
     carrier, position = body, wheel.center_B
     rotation = Rotation.from_euler("z", wheel.heading_degrees, degrees=True)
     if wheel.swivels:
         carrier = _add_body(body, names.fork(wheel.name), wheel.p_BoHo_B, rotation)
-        _add(carrier, "joint", name=names.swivel_joint(wheel.name), type="hinge", axis="0 0 1")
+        swivel = _add(carrier, "joint", name=names.swivel_joint(wheel.name), type="hinge", axis="0 0 1")
+        if wheel.steered:
+            kp, kv = gains.steering_stiffness[wheel.name], gains.steering_damping[wheel.name]
+            swivel.set("armature", _numbers([time_step * kv + time_step**2 * kp]))
         _add_inertial(carrier, fork_inertia(wheel))
         position, rotation = np.array([-wheel.swivel_offset, 0.0, 0.0]), Rotation.identity()
     hub = _add_body(carrier, names.hub(wheel.name), position, rotation)
-    _add(hub, "joint", name=names.drive_joint(wheel.name), type="hinge", axis="0 1 0")
+    drive = _add(hub, "joint", name=names.drive_joint(wheel.name), type="hinge", axis="0 1 0")
+    if wheel.driven:
+        drive.set("armature", _numbers([time_step * gains.drive_damping[wheel.name]]))
     _add_inertial(hub, hub_inertia(wheel))
     if not isinstance(wheel, RollerWheel):
         radii = (wheel.radius, 0.5 * wheel.width, wheel.radius)

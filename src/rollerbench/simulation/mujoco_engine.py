@@ -11,10 +11,10 @@ from scipy.spatial.transform import Rotation
 
 from rollerbench.errors import DescriptionError, ResourceError, SimulationError
 from rollerbench.kinematics.contact import RobotMotion
-from rollerbench.plant import servo_gains
 from rollerbench.sdf import names
 from rollerbench.sdf.contact import GRAVITY
 from rollerbench.sdf.mjcf import DEFAULT_STEP, robot_to_mjcf
+from rollerbench.sdf.servo import ServoGains, servo_gains
 from rollerbench.simulation.log import Progress, Samples, Simulated, odometry_poses, provenance, recording_of
 from rollerbench.simulation.scenario import Scenario
 from rollerbench.simulation.watch import CHUNK, NOT_FINITE, SETTLE_TIME, wrong_pose
@@ -58,8 +58,7 @@ def simulate(scenario: Scenario, *, progress: Progress | None = None) -> Simulat
     _stand_at_rest(model, data, scenario)
     count = math.floor(scenario.duration / step + 1e-6)
     times = step * np.arange(count + 1, dtype=np.float64)
-    command = scenario.motion.wheel_speeds(times)
-    control = np.hstack([command, scenario.motion.steering_angles(times)])
+    command, control, motors = scenario.motion.wheel_speeds(times), _control(scenario, times), _Motors(model, scenario)
     q, v = np.zeros((count + 1, model.nq)), np.zeros((count + 1, model.nv))
     effort = np.zeros((count + 1, command.shape[1]))
     started, failure, done = time.perf_counter(), None, count
@@ -74,8 +73,7 @@ def simulate(scenario: Scenario, *, progress: Progress | None = None) -> Simulat
                     done = index
                     break
             data.ctrl[:] = control[index]
-            mujoco.mj_step(model, data)
-            effort[index] = data.actuator_force[: command.shape[1]]
+            effort[index] = motors.step(model, data)
     except KeyboardInterrupt:
         failure, done = f"interrupted at t = {times[index]:.3f} s", index
     wall_time = time.perf_counter() - started
@@ -95,16 +93,60 @@ def simulate(scenario: Scenario, *, progress: Progress | None = None) -> Simulat
     return Simulated(recording=recording, failure=failure, wall_time=wall_time)
 
 
+def _gains(scenario: Scenario) -> ServoGains:
+    return servo_gains(scenario.robot, time_constant=scenario.controller.servo_time_constant)
+
+
+def _control(scenario: Scenario, times: Array) -> Array:
+    """What the actuators are told (n, n_driven + n_steered): see `robot_to_mjcf`."""
+    motion, gains = scenario.motion, _gains(scenario)
+    lead = np.array(
+        [gains.steering_damping[w.name] / gains.steering_stiffness[w.name] for w in scenario.robot.steered_wheels]
+    )
+    angles = motion.steering_angles
+    return np.hstack([motion.wheel_speeds(times), angles(times) + lead * angles.rate(times)])
+
+
+class _Motors:
+    """The drive motors at their effort limits, where the armature of `robot_to_mjcf` must not act."""
+
+    def __init__(self, model: Any, scenario: Scenario) -> None:
+        wheels = scenario.robot.driven_wheels
+        self.dofs = np.array([model.joint(names.drive_joint(wheel.name)).dofadr[0] for wheel in wheels])
+        self.limits = np.array([math.inf if wheel.max_effort is None else wheel.max_effort for wheel in wheels])
+        self.gains = np.array([_gains(scenario).drive_damping[wheel.name] for wheel in wheels])
+        self.armature = model.dof_armature[self.dofs].copy()
+
+    def step(self, model: Any, data: Any) -> Array:
+        """Advances the simulation; returns the motors' torques (n_driven,) [N m]."""
+        import mujoco
+
+        n = len(self.dofs)
+        wanted = self.gains * (data.ctrl[:n] - data.qvel[self.dofs])
+        if (np.abs(wanted) <= self.limits).all():
+            before = data.qvel[self.dofs].copy()
+            mujoco.mj_step(model, data)
+            return wanted - self.gains * (data.qvel[self.dofs] - before)
+        # Which torques would be too large, if there were no limits?
+        model.actuator_forcelimited[:n] = 0
+        mujoco.mj_forward(model, data)
+        saturated = np.abs(wanted - self.armature * data.qacc[self.dofs]) > self.limits
+        model.actuator_forcelimited[:n] = saturated
+        model.dof_armature[self.dofs] = np.where(saturated, 0.0, self.armature)
+        before = data.qvel[self.dofs].copy()
+        mujoco.mj_step(model, data)
+        model.dof_armature[self.dofs] = self.armature
+        free = wanted - self.gains * (data.qvel[self.dofs] - before)
+        return np.where(saturated, np.clip(wanted, -self.limits, self.limits), free)
+
+
 def _mjcf(scenario: Scenario, step: float) -> str:
-    gains = servo_gains(scenario.robot, time_constant=scenario.controller.servo_time_constant)
     slope = math.radians(scenario.ground.slope_deg)
     return robot_to_mjcf(
         scenario.simulated_robot,
         friction=scenario.ground.friction,
         gravity=(-GRAVITY * math.sin(slope), 0.0, -GRAVITY * math.cos(slope)),
-        drive_damping=gains.drive_damping,
-        steering_stiffness=gains.steering_stiffness,
-        steering_damping=gains.steering_damping,
+        gains=_gains(scenario),
         time_step=step,
     )
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from pydrake.geometry import Meshcat
 
 from rollerbench.errors import RollerbenchWarning, SimulationError
@@ -15,7 +14,7 @@ from rollerbench.simulation import drake_engine, mujoco_engine
 from rollerbench.simulation.folder import check_folder, write_folder
 from rollerbench.simulation.log import Progress, Simulated
 from rollerbench.simulation.scenario import Scenario, load_scenario
-from rollerbench.simulation.summary import cross_check, summarize
+from rollerbench.simulation.summary import apart, cross_check, summarize
 from rollerbench.visualization.scene import SIMULATED_COLOR, draw_path, local_meshcat
 
 
@@ -80,13 +79,21 @@ def run(
     if not len(recording.time):
         raise SimulationError(f"{scenario.name}: {failure}; nothing was recorded")
     page = _page(meshcat, scenario, recording) if meshcat is not None and scenario.engine != "mujoco" else None
-    second = mujoco_engine.simulate(scenario) if scenario.engine == "both" and failure is None else None
-    half = _simulated(_at_half_step(scenario)) if scenario.check_step and failure is None else None
+    second = half = None
+    try:
+        if scenario.engine == "both" and failure is None:
+            second = mujoco_engine.simulate(scenario, progress=progress)
+            failure = _named("the cross-check with MuJoCo", second.failure)
+        if scenario.check_step and failure is None:
+            half = _simulated(_at_half_step(scenario), progress=progress)
+            failure = _named("the run with half the step", half.failure)
+    except SimulationError as error:
+        failure = str(error)
     summary = summarize(
         scenario,
         simulated,
-        half_step=_change(half, recording) if half is not None else None,
-        second=cross_check(second) if second is not None else None,
+        half_step=apart(half.recording, recording) if half is not None and half.failure is None else None,
+        second=cross_check(second, recording) if second is not None else None,
     )
     if folder is not None:
         write_folder(folder, scenario, recording, summary, page if keep_page else None, second)
@@ -124,10 +131,8 @@ def _at_half_step(scenario: Scenario) -> Scenario:
     )
 
 
-def _change(half: Simulated, recording: Recording) -> np.ndarray[Any, np.dtype[np.float64]]:
-    """Final pose at half the step minus that of the run (3,) [m, m, rad]."""
-    change: np.ndarray[Any, np.dtype[np.float64]] = half.recording.q_xyt[-1] - recording.q_xyt[-1]
-    return change
+def _named(run: str, failure: str | None) -> str | None:
+    return None if failure is None else f"{run}: {failure}"
 
 
 def _warn_about_step(scenario: Scenario) -> None:

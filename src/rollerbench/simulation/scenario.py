@@ -21,8 +21,8 @@ from rollerbench.kinematics import WheelKinematics
 from rollerbench.kinematics.bumps import Bumps
 from rollerbench.kinematics.motion import Motion, twist_motion, wheel_motion
 from rollerbench.kinematics.profile import reference_poses
-from rollerbench.plant.servo import DRIVE_TIME_CONSTANT
 from rollerbench.resources import scenario_file
+from rollerbench.sdf.servo import DRIVE_TIME_CONSTANT
 from rollerbench.simulation.commands import Command, WheelSpeedsCommand
 from rollerbench.simulation.imperfections import Errors
 

@@ -47,10 +47,21 @@ def summarize(
     }
 
 
-def cross_check(second: Simulated) -> dict[str, Any]:
-    """Figures of a second engine that simulated the same scenario."""
-    engine = second.recording.metadata["engine"]
-    return {"engine": engine, "failure": second.failure, **_outcome(second.recording, None)}
+def cross_check(second: Simulated, recording: Recording) -> dict[str, Any]:
+    """Figures of a second engine that simulated the same scenario as a recording."""
+    return {
+        "engine": second.recording.metadata["engine"],
+        "failure": second.failure,
+        "apart": [float(value) for value in apart(second.recording, recording)],
+        **_outcome(second.recording, None),
+    }
+
+
+def apart(other: Recording, recording: Recording) -> Array:
+    """Pose of another recording minus that of this one (3,) at the last time that both have [m, m, rad]."""
+    last = min(other.time[-1], recording.time[-1])
+    poses = [np.array([np.interp(last, each.time, column) for column in each.q_xyt.T]) for each in (other, recording)]
+    return poses[0] - poses[1]
 
 
 def _outcome(recording: Recording, half_step: Array | None) -> dict[str, Any]:

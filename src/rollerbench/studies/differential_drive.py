@@ -198,8 +198,8 @@ def _smallest_radius(robot: Robot, runs: Mapping[str, RunResult]) -> Part:
         Curve(label="simulated", x=np.array(GAMMAS_DEG, dtype=float), y=np.array(simulated), style="o"),
     ]
     caption = (
-        "Smallest radius of C over gamma, with l cos(gamma) = 0.2 m: a full turn about the middle of the axle. At gamma "
-        "= 0, and only there, it is a turn about C itself; the cart then has a second castor behind, or it would tip over."
+        "Smallest radius of C over gamma, with l cos(gamma) = 0.2 m: a full turn about the middle of the axle. At "
+        "gamma = 0, and only there, it is a turn about C itself; the cart then has a second castor, so as not to tip."
     )
     svg = curves("gamma [deg]", {"R_min [m]": lines})
     return results, [Picture(name="smallest_radius", title="Section 3.3.", caption=caption, svg=svg)]
