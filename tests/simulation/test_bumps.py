@@ -8,6 +8,7 @@ import pytest
 
 import robots
 import rollerbench as rb
+from contacts import steps_with_contacts
 
 BUMPS = {"height": 0.002, "width": 0.06, "density": 60}
 ROUGH: dict[str, Any] = {
@@ -43,31 +44,17 @@ def test_depth_contact_and_slip_on_bumps_are_those_of_drake(
     Its normal is uncertain by up to 0.15 rad then. So a roller that hits a bump at 0.4 m/s has some of its speed along
     the normal counted as slip.
     """
-    from pydrake.systems.analysis import Simulator
-
     from rollerbench.kinematics.contact import wheel_contact
     from rollerbench.plant.ground import BUMPS as CARRIER
-    from rollerbench.simulation.log import robot_motion
 
     command = {**ROUGH["command"], "infeasible": "project"}
     scenario = rb.load_scenario({**ROUGH, "robot": make, "command": command, "errors": {"ground_bumps": bumps}})
-    station = rb.build_station(scenario)
-    simulator = Simulator(station)
-    context, model = simulator.get_mutable_context(), station.parts.model
-    model.set_pose(model.plant.GetMyMutableContextFromRoot(context), [0, 0, 0])
-    nq, compared = model.plant.num_positions(), 0
-    for step in range(300):
-        # Between two updates of the plant: times at an update leave open on which side of it they lie.
-        simulator.AdvanceTo((step + 0.5) * 0.005)
-        before = station.GetOutputPort("state").Eval(context)
-        results = station.GetOutputPort("contact_results").Eval(context)
-        simulator.AdvanceTo((step + 1.5) * 0.005)
-        after = station.GetOutputPort("state").Eval(context)
-        motion = robot_motion(model, np.hstack([before[:nq], after[nq:]])[np.newaxis])
+    compared = 0
+    for plant, motion, results in steps_with_contacts(scenario, range(300)):
         deepest: dict[str, Any] = {}
         for i in range(results.num_point_pair_contacts()):
             info = results.point_pair_contact_info(i)
-            pair = {model.plant.get_body(index).name() for index in (info.bodyA_index(), info.bodyB_index())}
+            pair = {plant.get_body(index).name() for index in (info.bodyA_index(), info.bodyB_index())}
             (part,) = pair - {"WorldBody", "world", CARRIER}
             wheel = next(name for name in scenario.robot.wheel_names if part.startswith(name))
             if wheel not in deepest or info.point_pair().depth > deepest[wheel][0].point_pair().depth:

@@ -14,6 +14,7 @@ from ruamel.yaml import YAML
 
 import robots
 import rollerbench as rb
+from contacts import steps_with_contacts
 
 TURNING = {
     "name": "turning",
@@ -116,32 +117,16 @@ def test_the_recording_reads_back_without_drake(folder: Path) -> None:
 
 def test_slip_and_contacts_are_those_of_drake() -> None:
     """Contact points within the penetration, slip within 10 micrometres a second of Drake's contact results."""
-    from pydrake.systems.analysis import Simulator
-
     from rollerbench.kinematics.contact import wheel_contact
-    from rollerbench.simulation.log import robot_motion
 
     scenario = rb.load_scenario("youbot_turn_clockwise")
-    station = rb.build_station(scenario)
-    simulator = Simulator(station)
-    context = simulator.get_mutable_context()
-    model = station.parts.model
-    model.set_pose(model.plant.GetMyMutableContextFromRoot(context), [0, 0, 0])
-    nq = model.plant.num_positions()
     compared = 0
-    for step in range(160, 200):
-        # Between two updates of the plant: times at an update leave open on which side of it they lie.
-        simulator.AdvanceTo((step + 0.5) * 0.005)
-        before = station.GetOutputPort("state").Eval(context)
-        results = station.GetOutputPort("contact_results").Eval(context)
-        simulator.AdvanceTo((step + 1.5) * 0.005)
-        after = station.GetOutputPort("state").Eval(context)
-        motion = robot_motion(model, np.hstack([before[:nq], after[nq:]])[np.newaxis])
+    for plant, motion, results in steps_with_contacts(scenario, range(160, 200)):
         found = {}
         for i in range(results.num_point_pair_contacts()):
             info = results.point_pair_contact_info(i)
             pair = (info.bodyA_index(), info.bodyB_index())
-            names = {model.plant.get_body(index).name() for index in pair}
+            names = {plant.get_body(index).name() for index in pair}
             found[(names - {"world"}).pop()] = info
         for wheel in scenario.robot.wheels:
             contact = wheel_contact(scenario.robot, wheel, motion)

@@ -34,6 +34,10 @@ MEANINGS = {
 """What each part of a budget is, in its order."""
 
 
+CONTACT = ("drive_x", "drive_y", "slip_x", "slip_y", "contact_x", "contact_y", "depth", "rolling_radius")
+"""Columns of a wheel's contact."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ErrorBudget:
     """The pose error over time as a sum of parts.
@@ -126,7 +130,7 @@ def _robots(recording: Recording) -> tuple[Robot, dict[str, Robot], Literal["tex
 
 
 def _require_columns(recording: Recording) -> None:
-    needed = [f"{wheel}.{column}" for wheel in recording.wheel_names for column in (*_CONTACT, "speed", "measured")]
+    needed = [f"{wheel}.{column}" for wheel in recording.wheel_names for column in (*CONTACT, "speed", "measured")]
     missing = [name for name in needed if name not in recording.columns]
     if missing:
         raise ResourceError(f"the recording lacks {', '.join(missing[:3])} and so has no error budget: run it again")
@@ -159,7 +163,7 @@ def _contact_twists(recording: Recording, robot: Robot, speeds: Array) -> tuple[
     rows, rolling, slipping, depths = [], [], [], []
     driven = [wheel.name for wheel in robot.driven_wheels]
     for wheel in robot.wheels:
-        get = {name: recording.columns[f"{wheel.name}.{name}"][:-1] for name in _CONTACT}
+        get = {name: recording.columns[f"{wheel.name}.{name}"][:-1] for name in CONTACT}
         drive = np.column_stack([get["drive_x"], get["drive_y"]])
         slip = np.column_stack([get["slip_x"], get["slip_y"]])
         place = np.column_stack([get["contact_x"], get["contact_y"]])
@@ -185,9 +189,6 @@ def _contact_twists(recording: Recording, robot: Robot, speeds: Array) -> tuple[
     inverse = np.linalg.pinv(matrix * weights[..., np.newaxis]) * weights[:, np.newaxis]
     without, slip_alone = (np.einsum("nij,nj->ni", inverse, np.column_stack(right)) for right in (rolling, slipping))
     return without, without + slip_alone
-
-
-_CONTACT = ("drive_x", "drive_y", "slip_x", "slip_y", "contact_x", "contact_y", "depth", "rolling_radius")
 
 
 def _row(direction: Array, place: Array) -> Array:

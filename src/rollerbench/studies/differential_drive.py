@@ -5,8 +5,8 @@ from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import cumulative_trapezoid
 
+from rollerbench.analysis import error_budget
 from rollerbench.description import Robot, load_robot
 from rollerbench.kinematics import WheelKinematics
 from rollerbench.kinematics.odometry import rotate
@@ -248,7 +248,7 @@ def _other_causes(robot: Robot, runs: Mapping[str, RunResult]) -> Part:
                           theory=bend, simulated=circle_radius(run.recording.q_xyt[:, :2])))  # fmt: skip
     run = runs["cart_slip"]
     results.append(Result(item="Section 4", quantity="yaw on a wet patch, hard start and stop; theory: by its slip",
-                          unit="deg", theory=math.degrees(_yaw_from_slip(run)),
+                          unit="deg", theory=math.degrees(error_budget(run.recording).parts["slip"][-1, 2]),
                           simulated=math.degrees(run.recording.q_xyt[-1, 2])))  # fmt: skip
     run = runs["cart_backlash"]
     play = math.radians(run.scenario.errors.backlash_deg["right"])
@@ -379,14 +379,6 @@ def _wave(robot: Robot, run: RunResult, x: Array, y: Array) -> float:
     return float(2e3 * np.hypot(sine, cosine))
 
 
-def _yaw_from_slip(run: RunResult) -> float:
-    """Yaw that the recorded slip of the tyres along the body explains [rad]."""
-    slip = run.recording.wheels("slip_x")[:, :2]
-    speed = run.recording.wheels("speed")[:, :2] * [wheel.radius for wheel in run.scenario.robot.wheels[:2]] + slip
-    rate = (speed[:, 1] - speed[:, 0]) / (2 * half_track(run.scenario.robot))
-    return float(cumulative_trapezoid(rate, run.recording.time)[-1])
-
-
 PAPER = Paper(
     name="differential_drive",
     title="Two geared tyres and a castor",
@@ -394,8 +386,8 @@ PAPER = Paper(
     introduction=(
         "The paper prints no dimensions; differential_cart/README.md tells those of the cart here. Its mass centre C "
         "lies l sin(gamma) ahead of the axle, with gamma = 20 deg.",
-        "Gear errors are relative errors of the ratio of the right gear: a constant part, and a wave over the wheel's "
-        "angle. Motors turn as commanded and carry the encoders, so the odometry sees nothing of it.",
+        "Gear errors are relative errors of the ratio of the right gear: a constant part, and a wave over the motor's "
+        "angle. On level ground the motors turn as commanded, and they carry the encoders: the odometry sees nothing.",
     ),
     scenarios=scenarios,
     evaluate=evaluate,
