@@ -74,6 +74,16 @@ def test_a_window_of_all_rollers_is_the_full_model() -> None:
     assert not np.isnan(recordings[1].wheels("first_roller")).any()
 
 
+def test_recordings_agree_column_by_column() -> None:
+    full, windowed = (
+        simulate(scenario(mecanum(12), MOTIONS["combined"], roller_model=model)).recording
+        for model in ("full", "windowed")
+    )
+    for column in ("angle", "speed", "effort", "contact_x", "contact_y", "depth", "slip_x", "slip_y", "drive_y"):
+        one, other = full.wheels(column), windowed.wheels(column)
+        assert np.sqrt(np.mean((one - other) ** 2)) < 2e-3 * np.sqrt(np.mean(one**2)), column
+
+
 def test_rollers_that_are_not_simulated_are_remembered() -> None:
     """While the robot turns and speeds up, the speeds of all rollers follow those of the full model."""
     full, windowed = (

@@ -119,7 +119,7 @@ def test_slip_and_contacts_are_those_of_drake() -> None:
     """Contact points within the penetration, slip within 10 micrometres a second of Drake's contact results."""
     from rollerbench.kinematics.contact import wheel_contact
 
-    scenario = rb.load_scenario("youbot_turn_clockwise")
+    scenario = rb.load_scenario("youbot_turn_clockwise", overrides={"plant.roller_model": "full"})
     compared = 0
     for plant, motion, results in steps_with_contacts(scenario, range(160, 200)):
         found = [results.point_pair_contact_info(i) for i in range(results.num_point_pair_contacts())]
