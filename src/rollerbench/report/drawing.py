@@ -8,6 +8,7 @@ from itertools import cycle
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -71,6 +72,12 @@ def new_figure(rows: int) -> tuple[Figure, list[Axes]]:
 def svg_text(figure: Figure) -> str:
     """The figure as SVG, the same text for the same figure."""
     stream = io.StringIO()
+    FigureCanvasSVG(figure)
+    layout = figure.get_layout_engine()
+    if layout is not None:
+        # Laid out once: left to savefig, the figure would be laid out and drawn twice.
+        layout.execute(figure)
+        figure.set_layout_engine(None)
     # A fixed salt and no date: the same run gives the same file.
     with mpl.rc_context({"svg.hashsalt": "rollerbench", "svg.fonttype": "path"}):
         figure.savefig(stream, format="svg", metadata={"Date": None})
