@@ -34,13 +34,20 @@ Progress = Callable[[str], None]
 
 
 def against_rollers(
-    engines: Mapping[str, Engine], counts: Sequence[int], *, duration: float, rounds: int, progress: Progress
+    engines: Mapping[str, Engine],
+    counts: Sequence[int],
+    *,
+    settings: Sequence[Setting],
+    duration: float,
+    rounds: int,
+    progress: Progress,
 ) -> list[dict[str, Any]]:
     """Time of a step [us] for each number of rollers a wheel, moving sideways.
 
     Args:
         engines: Engines by the first word of the families that they run.
         counts: Rollers a wheel.
+        settings: How they are simulated.
         duration: Simulated time [s].
         rounds: Rounds of interleaved runs.
         progress: Called with what is being done.
@@ -48,27 +55,33 @@ def against_rollers(
 
     def runner(engine: Engine, setting: Setting, count: int) -> Any:
         robot = robot_with_rollers(count)
-        return engine.prepare(robot, motions(robot, duration=duration, ramp=0.2 * duration, names=("y",)), setting)
+        return engine.prepare(robot, motions(robot, duration=duration, ramp=0.3 * duration, names=("y",)), setting)
 
-    cases = [(engine, setting, count) for engine, setting in _of(engines) for count in counts]
+    cases = [(engine, setting, count) for engine, setting in _of(engines, settings) for count in counts]
     return _measured(cases, runner, "rollers", duration, rounds, progress)
 
 
 def against_robots(
-    engines: Mapping[str, Engine], counts: Sequence[int], *, duration: float, rounds: int, progress: Progress
+    engines: Mapping[str, Engine],
+    counts: Sequence[int],
+    *,
+    settings: Sequence[Setting],
+    duration: float,
+    rounds: int,
+    progress: Progress,
 ) -> list[dict[str, Any]]:
     """Time of a step [us] for each number of robots in one plant, all moving diagonally."""
 
     def runner(_: Engine, setting: Setting, count: int) -> Any:
         robot = robot_with_rollers(COUNT)
-        (motion,) = motions(robot, duration=duration, ramp=0.2 * duration, names=("diagonal",))
+        (motion,) = motions(robot, duration=duration, ramp=0.3 * duration, names=("diagonal",))
         if setting.family.startswith("MuJoCo"):
             return _mujoco_crowd(motion, setting, count)
         return CrowdRunner(motion, setting, count, SPACING)
 
     cases = [
         (engine, setting, count)
-        for engine, setting in _of(engines)
+        for engine, setting in _of(engines, settings)
         for count in counts
         if engine.name in ("MuJoCo", "rollerbench")
     ]
@@ -84,9 +97,9 @@ def _mujoco_crowd(motion: Motion, setting: Setting, count: int) -> MujocoRunner:
     return MujocoRunner(model, [motion], copies=count)
 
 
-def _of(engines: Mapping[str, Engine]) -> list[tuple[Engine, Setting]]:
+def _of(engines: Mapping[str, Engine], settings: Sequence[Setting]) -> list[tuple[Engine, Setting]]:
     found = []
-    for setting in SETTINGS:
+    for setting in settings:
         engine = engines.get(setting.family.split()[0])
         if engine is not None:
             found.append((engine, setting))
