@@ -61,7 +61,7 @@ class BulletEngine:
 
     def reference(self, effort: str) -> tuple[Setting, Setting]:
         """Many iterations and fine rollers, at a small step."""
-        step = {"smoke": 2e-3, "quick": 1e-3}.get(effort, 5e-4)
+        step = {"smoke": 2e-3, "quick": 1e-3}.get(effort, 2.5e-4)
         fine = Setting(family=FAMILY, time_step=step, options={"iterations": 200, "rollers": "spheres 21"})
         return fine, fine.with_step(2 * step)
 

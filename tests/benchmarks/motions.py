@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +10,10 @@ from numpy.typing import NDArray
 import rollerbench as rb
 from rollerbench.description.rollers import largest_radius, roller_clearance
 from rollerbench.kinematics.profile import Profile, reference_poses
+
+if TYPE_CHECKING:
+    # Its import loads Drake, which processes that measure the memory of other engines must not.
+    from rollerbench.simulation import Scenario
 
 Array = NDArray[np.float64]
 
@@ -37,7 +42,7 @@ class Motion:
     """
 
     name: str
-    scenario: rb.Scenario
+    scenario: "Scenario"
 
     @cached_property
     def twist(self) -> Profile:

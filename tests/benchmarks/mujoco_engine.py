@@ -68,7 +68,7 @@ class MujocoEngine:
 
     def reference(self, effort: str) -> tuple[Setting, Setting]:
         """The exported contact (elliptic, 2 ms, 0.99) with stiffer friction, at a small step."""
-        step = {"smoke": 1e-3, "quick": 5e-4}.get(effort, 2.5e-4)
+        step = {"smoke": 1e-3}.get(effort, 2.5e-4)
         options = {**BASE, "impratio": 1000.0, "solref_time": 0.002}
         fine = Setting(family="MuJoCo elliptic", time_step=step, options=options)
         return fine, fine.with_step(2 * step)
