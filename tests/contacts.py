@@ -16,6 +16,7 @@ def steps_with_contacts(scenario: rb.Scenario, steps: Iterable[int]) -> Iterator
 
     station = rb.build_station(scenario)
     simulator = Simulator(station)
+    rb.follow_rollers(simulator)
     context, model = simulator.get_mutable_context(), station.parts.model
     model.set_pose(model.plant.GetMyMutableContextFromRoot(context), [0, 0, 0])
     nq = model.plant.num_positions()
@@ -26,4 +27,6 @@ def steps_with_contacts(scenario: rb.Scenario, steps: Iterable[int]) -> Iterator
         results = station.GetOutputPort("contact_results").Eval(context)
         simulator.AdvanceTo((step + 1.5) * 0.005)
         after = station.GetOutputPort("state").Eval(context)
-        yield model.plant, robot_motion(model, np.hstack([before[:nq], after[nq:]])[np.newaxis]), results
+        state = np.hstack([before[:nq], after[nq:]])[np.newaxis]
+        remembered = station.GetOutputPort("rollers").Eval(context)[np.newaxis] if model.roller_window else None
+        yield model.plant, robot_motion(model, state, np.array([context.get_time()]), remembered), results

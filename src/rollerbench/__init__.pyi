@@ -26,6 +26,7 @@ from .kinematics import odometry as odometry
 from .plant import RobotModel as RobotModel
 from .plant import add_ground as add_ground
 from .plant import add_robot as add_robot
+from .plant import follow_rollers as follow_rollers
 from .recording import Recording as Recording
 from .simulation import RunResult as RunResult
 from .simulation import Scenario as Scenario

@@ -2,7 +2,7 @@
 
 import sys
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Protocol
@@ -168,11 +168,11 @@ def export(
     ] = None,
 ) -> None:
     """Write a robot as a model for other simulators."""
-    from rollerbench.description import load_robot
+    from rollerbench.description import Robot, load_robot
     from rollerbench.description.files import write_atomically
     from rollerbench.sdf import robot_to_mjcf, robot_to_sdf
 
-    writers = {"sdf": robot_to_sdf, "mjcf": robot_to_mjcf}
+    writers: dict[str, Callable[[Robot], str]] = {"sdf": robot_to_sdf, "mjcf": robot_to_mjcf}
     if format_ not in writers:
         raise RollerbenchError(f"--format {format_!r}: accepted: {', '.join(writers)}")
     text = writers[format_](load_robot(robot))

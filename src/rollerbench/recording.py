@@ -42,6 +42,7 @@ WHEEL_COLUMNS: dict[str, str] = {
     "drive_x": "-",
     "drive_y": "-",
     "rolling_radius": "m",
+    "first_roller": "-",
 }
 """Columns of each wheel, named wheel.column, and their units.
 
@@ -139,4 +140,5 @@ class Recording:
 
 
 def _unit(name: str) -> str:
-    return ROBOT_COLUMNS.get(name) or WHEEL_COLUMNS[name.rpartition(".")[2]]
+    column = name.rpartition(".")[2]
+    return ROBOT_COLUMNS.get(name) or WHEEL_COLUMNS.get(column) or "rad/s"

@@ -40,7 +40,8 @@ def test_shipped_scenarios_are_named_by_their_files(name: str) -> None:
         ({"command": {"type": "twist", "v_xyw_B": [1, 0, 0], "ramp": 0.6}}, ["command.ramp = 0.6", "up to 0.5"]),
         ({"command": {"type": "wheel_speeds", "wheel_speeds": {"left": 1.0}}}, ["wheel_speeds.left", "front_left"]),
         ({"plant": {"roller_model": "half"}}, ["plant.roller_model = 'half'", "'full'"]),
-        ({"plant": {"contact_approximation": "tamsi"}}, ["plant.contact_approximation = 'tamsi'", "'lagged'"]),
+        ({"plant": {"contact_approximation": "tamsi"}}, ["plant.contact_approximation = 'tamsi'", "lagged, similar"]),
+        ({"plant": {"roller_window": 1}}, ["plant.roller_window = 1", "greater than or equal to 2"]),
         ({"plant": {"time_step": -0.001}}, ["plant.time_step = -0.001", "greater than or equal to"]),
         ({"plant": {"time_step": 0.05}, "duration": 0.04, "command": {**BASE["command"], "ramp": 0.0}}, ["time_step"]),  # type: ignore[dict-item]
         ({"ground": {"roll_resistance": 0.1}}, ["ground.roll_resistance = 0.1"]),

@@ -2,6 +2,7 @@
 
 from rollerbench.plant.ground import add_ground
 from rollerbench.plant.robot_model import RobotModel, add_robot
+from rollerbench.plant.window import RollerWindow, follow_rollers
 from rollerbench.sdf.servo import ServoGains, servo_gains
 
-__all__ = ["RobotModel", "ServoGains", "add_ground", "add_robot", "servo_gains"]
+__all__ = ["RobotModel", "RollerWindow", "ServoGains", "add_ground", "add_robot", "follow_rollers", "servo_gains"]

@@ -39,6 +39,8 @@ def add_ground(
         raise SimulationError("add_ground: the plant has no scene graph; accepted: AddMultibodyPlantSceneGraph")
     properties = ProximityProperties()
     AddContactMaterial(point_stiffness=RIGID, friction=CoulombFriction(friction, friction), properties=properties)
+    # Of Drake's SAP only, which otherwise lets contacts creep.
+    properties.AddProperty("material", "relaxation_time", 0.0)
     logging.getLogger("drake").addFilter(_not_about_deformables)
     plant.RegisterCollisionGeometry(plant.world_body(), RigidTransform(), HalfSpace(), "ground", properties)
     if slope_deg:

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,12 +18,15 @@ from pydrake.multibody.tree import (
     RevoluteJoint,
     RigidBody,
 )
-from pydrake.systems.framework import Context
+from pydrake.systems.framework import Context, DiagramBuilder
 
 from rollerbench.description import AnyWheel, Robot, load_robot
+from rollerbench.errors import SimulationError
+from rollerbench.plant.window import RollerWindow, WindowedWheel
 from rollerbench.sdf import names, robot_to_sdf
 from rollerbench.sdf.contact import static_penetration
 from rollerbench.sdf.servo import ServoGains, servo_gains
+from rollerbench.sdf.window import DEFAULT_SIZE, Window, windows
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,12 +41,14 @@ class RobotModel:
         plant: Where it was added.
         model_instance: Its model instance.
         body: The chassis.
+        roller_window: What remembers the rollers that are not simulated, if there are such.
     """
 
     robot: Robot
     plant: MultibodyPlant
     model_instance: ModelInstanceIndex
     body: RigidBody
+    roller_window: RollerWindow | None = None
 
     def drive_joint(self, wheel: AnyWheel) -> RevoluteJoint:
         """The joint about a wheel's axle."""
@@ -54,8 +59,13 @@ class RobotModel:
         return self._joint(names.swivel_joint(wheel.name))
 
     def roller_joints(self, wheel: AnyWheel) -> list[RevoluteJoint]:
-        """The joints of a wheel's rollers, from the one at the bottom at wheel angle 0; none for a tyre."""
+        """The joints of a wheel's rollers, from the one at the bottom at wheel angle 0; none for a tyre.
+
+        Of a windowed wheel those of the simulated rollers, by slot (see `rollerbench.sdf.window.Window`).
+        """
         count = wheel.ring.count if wheel.ring else 0
+        if self.roller_window is not None and wheel.name in self.roller_window.windows:
+            count = self.roller_window.windows[wheel.name].size
         return [self._joint(names.roller_joint(wheel.name, index)) for index in range(count)]
 
     @property
@@ -157,21 +167,41 @@ def add_robot(
     robot: Robot | str | Path | Mapping[str, Any],
     *,
     gains: ServoGains | None = None,
+    roller_model: Literal["full", "windowed"] = "full",
+    builder: DiagramBuilder | None = None,
+    window_size: int = DEFAULT_SIZE,
+    visuals: bool = True,
 ) -> RobotModel:
-    """Adds a robot with all its rollers to a plant that is not finalized, standing on z = 0, servo gains set.
+    """Adds a robot to a plant that is not finalized, standing on z = 0, servo gains set.
+
+    With `roller_model="windowed"` only the rollers near the ground are simulated, which is faster, the more so the more
+    rollers the wheels have. Then call `follow_rollers(simulator)` before the simulation. The ground must touch the
+    wheels at the bottom, as it does on planes and low bumps; beside walls and on robots that tip, use "full".
 
     Args:
         plant: The plant.
         robot: Robot, name of a shipped one, or path to a robot.yaml.
         gains: Gains of the servos; by default those of `servo_gains(robot)`.
+        roller_model: Which rollers are simulated.
+        builder: The builder of the plant's diagram; needed for windowed rollers, for the system that remembers them.
+        window_size: Number of simulated rollers a wheel, from 2; wheels with as many or fewer are simulated in full.
+        visuals: Whether the robot shall be seen; a step is a little faster without.
+
+    Raises:
+        SimulationError: windowed rollers without a builder, or in a plant with continuous time.
     """
     robot = load_robot(robot)
+    windows = _windows(robot, plant, builder, window_size) if roller_model == "windowed" else {}
     parser = Parser(plant)
     parser.SetAutoRenaming(True)
-    (instance,) = parser.AddModelsFromString(robot_to_sdf(robot), "sdf")
-    model = RobotModel(
-        robot=robot, plant=plant, model_instance=instance, body=plant.GetBodyByName(names.BODY, instance)
-    )
+    (instance,) = parser.AddModelsFromString(robot_to_sdf(robot, windows, visuals=visuals), "sdf")
+    body = plant.GetBodyByName(names.BODY, instance)
+    roller_window = None
+    if windows and builder is not None:
+        wheels = [_windowed_wheel(plant, instance, window) for window in windows.values()]
+        roller_window = builder.AddSystem(RollerWindow(plant, wheels, robot.name))
+        roller_window.set_name(f"{plant.GetModelInstanceName(instance)}_rollers")
+    model = RobotModel(robot=robot, plant=plant, model_instance=instance, body=body, roller_window=roller_window)
     standing = RigidTransform([0.0, 0.0, -robot.ground_height - static_penetration(robot)])
     plant.SetDefaultFloatingBaseBodyPose(model.body, standing)
     gains = gains or servo_gains(robot)
@@ -184,3 +214,32 @@ def add_robot(
             PdControllerGains(p=gains.steering_stiffness[wheel.name], d=gains.steering_damping[wheel.name])
         )
     return model
+
+
+def _windows(
+    robot: Robot, plant: MultibodyPlant, builder: DiagramBuilder | None, window_size: int
+) -> dict[str, Window]:
+    if builder is None:
+        raise SimulationError(
+            "add_robot: windowed rollers need a system that remembers the others; accepted: builder=, the "
+            "DiagramBuilder of the plant, or roller_model='full'"
+        )
+    if plant.time_step() <= 0:
+        raise SimulationError(
+            "add_robot: windowed rollers are for discrete plants; accepted: a positive time step, or "
+            "roller_model='full'"
+        )
+    if window_size < 2:
+        raise SimulationError(f"add_robot: window_size = {window_size}: accepted: 2 or more")
+    return windows(robot, window_size)
+
+
+def _windowed_wheel(plant: MultibodyPlant, instance: ModelInstanceIndex, window: Window) -> WindowedWheel:
+    name = window.wheel.name
+    slots = [plant.GetJointByName(names.roller_joint(name, slot), instance) for slot in range(window.size)]
+    return WindowedWheel(
+        window=window,
+        body=plant.GetBodyByName(names.BODY, instance),
+        drive=plant.GetJointByName(names.drive_joint(name), instance),
+        slots=slots,
+    )

@@ -1,6 +1,7 @@
 """A robot as an SDF model: body, forks, hubs and rollers as links, revolute joints between them."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
 
 import numpy as np
 from lxml import etree
@@ -20,6 +21,7 @@ from rollerbench.description.mass import (
 from rollerbench.description.rollers import RollerRing
 from rollerbench.sdf import names
 from rollerbench.sdf.contact import contact_dissipation, contact_stiffness
+from rollerbench.sdf.window import Window
 
 DRAKE = "drake.mit.edu"
 BODY_COLOR = (0.20, 0.35, 0.55)
@@ -31,22 +33,31 @@ Z_TO_AXLE = Rotation.from_euler("x", 90, degrees=True)
 """Turns SDF's cylinders, which lie along z, onto the axle."""
 Z_TO_ROLLER_AXIS = Rotation.from_euler("y", 90, degrees=True)
 """Turns SDF's cylinders onto a roller's axis."""
+NO_TURN = Rotation.identity()
 BARREL_STEPS = (0.4, 0.7, 0.87, 1.0)
 """Half lengths of the cylinders that show a roller, over that of its barrel [-]."""
 
 
-def robot_to_sdf(robot: Robot) -> str:
+def robot_to_sdf(robot: Robot, windows: Mapping[str, Window] = MappingProxyType({}), *, visuals: bool = True) -> str:
     """The robot as SDF text, complete in itself.
 
     Link and joint names are those of `rollerbench.sdf.names`. Positive joint angles drive forward (hubs), turn left
     (swivels), and follow the right-hand rule about the roller's axis. Collision shapes are one ellipsoid a roller
     (`RollerRing.semi_axis`), one ellipsoid (R, width/2, R) a tyre, and the body's box; none collide with each other.
+
+    Args:
+        robot: The robot.
+        windows: Wheels by name of whose rollers only some are links, those near the ground at wheel angle 0; their hubs
+            carry the mass of the others, and the visuals of all.
+        visuals: Whether it shall be seen.
     """
     root = etree.Element("sdf", version="1.9", nsmap={"drake": DRAKE})
     model = _add(root, "model", name=robot.name)
     _add_body(model, robot)
     for wheel in robot.wheels:
-        _add_wheel(model, robot, wheel)
+        _add_wheel(model, robot, wheel, windows.get(wheel.name))
+    if not visuals:
+        etree.strip_elements(model, "visual")
     group = _drake(model, "collision_filter_group", name="robot")
     for link in model.findall("link"):
         _drake(group, "member", text=link.get("name"))
@@ -72,7 +83,7 @@ def _add_body(model: etree._Element, robot: Robot) -> None:
     _add_shape(link, "visual", "front", mark, position=ahead, color=SPOKE_COLOR)
 
 
-def _add_wheel(model: etree._Element, robot: Robot, wheel: AnyWheel) -> None:
+def _add_wheel(model: etree._Element, robot: Robot, wheel: AnyWheel, window: Window | None) -> None:
     heading = Rotation.from_euler("z", wheel.heading_degrees, degrees=True)
     carrier, position, rotation = names.BODY, wheel.center_B, heading
     if wheel.swivels:
@@ -81,12 +92,12 @@ def _add_wheel(model: etree._Element, robot: Robot, wheel: AnyWheel) -> None:
         position, rotation = np.array([-wheel.swivel_offset, 0.0, 0.0]), Rotation.identity()
     hub = _add(model, "link", name=names.hub(wheel.name))
     _add_pose(hub, position, rotation, relative_to=carrier)
-    _add_inertial(hub, hub_inertia(wheel))
+    _add_inertial(hub, hub_inertia(wheel) if window is None else window.hub_inertia(window.first_at(0.0)))
     _add_hub_visuals(hub, wheel)
     effort = (wheel.max_effort or -1.0) if wheel.driven else 0.0
     _add_joint(model, names.drive_joint(wheel.name), carrier, hub.get("name"), "0 1 0", effort, speed=wheel.max_speed)
     if isinstance(wheel, RollerWheel):
-        _add_rollers(model, robot, wheel)
+        _add_rollers(model, robot, wheel, hub, window)
     else:
         tyre = _ellipsoid((wheel.radius, 0.5 * wheel.width, wheel.radius))
         _add_contact(_add_shape(hub, "collision", "tyre", tyre), robot, friction=wheel.friction)
@@ -117,34 +128,57 @@ def _add_hub_visuals(hub: etree._Element, wheel: AnyWheel) -> None:
     _add_shape(hub, "visual", "spoke", spoke, position=np.array([0, 0, 0.5 * radius]), color=SPOKE_COLOR)
 
 
-def _add_rollers(model: etree._Element, robot: Robot, wheel: RollerWheel) -> None:
-    ring, hub = wheel.ring, names.hub(wheel.name)
+def _add_rollers(
+    model: etree._Element, robot: Robot, wheel: RollerWheel, hub: etree._Element, window: Window | None
+) -> None:
+    ring, poses = wheel.ring, roller_poses_H(wheel)
     shape = _ellipsoid((ring.semi_axis, ring.roller_radius, ring.roller_radius))
-    for index, (rotation, center) in enumerate(roller_poses_H(wheel)):
-        link = _add(model, "link", name=names.roller(wheel.name, index))
-        _add_pose(link, center, Rotation.from_matrix(rotation), relative_to=hub)
+    slots = range(ring.count) if window is None else window.rollers(window.first_at(0.0))
+    for slot, index in enumerate(slots):
+        rotation, center = poses[index]
+        link = _add(model, "link", name=names.roller(wheel.name, slot))
+        _add_pose(link, center, Rotation.from_matrix(rotation), relative_to=hub.get("name"))
         _add_inertial(link, roller_inertia(wheel))
-        _add_barrel_visuals(link, ring, ROLLER_COLORS[index % 2])
+        if window is None:
+            _add_barrel_visuals(link, ring, index)
         _add_contact(_add_shape(link, "collision", "barrel", shape), robot, friction=wheel.friction)
-        joint = names.roller_joint(wheel.name, index)
-        _add_joint(model, joint, hub, link.get("name"), "1 0 0", 0.0, damping=wheel.rollers.damping)
+        joint = names.roller_joint(wheel.name, slot)
+        _add_joint(model, joint, hub.get("name"), link.get("name"), "1 0 0", 0.0, damping=wheel.rollers.damping)
+    for index, (rotation, center) in enumerate(poses if window is not None else ()):
+        # Rollers are solids of revolution: those that the hub shows look as if they turned.
+        _add_barrel_visuals(hub, ring, index, Rotation.from_matrix(rotation), center)
 
 
-def _add_barrel_visuals(link: etree._Element, ring: RollerRing, color: tuple[float, float, float]) -> None:
+def _add_barrel_visuals(
+    link: etree._Element,
+    ring: RollerRing,
+    index: int,
+    rotation: Rotation = NO_TURN,
+    center: NDArray[np.float64] | None = None,
+) -> None:
     """Draws the part of the ellipsoid that ever touches the ground: cylinders of growing length inscribed in it."""
+    prefix = "barrel" if center is None else f"roller_{index:02d}_barrel"
     for step, share in enumerate(BARREL_STEPS):
         half_length = share * ring.half_length
         cylinder = _add(etree.Element("geometry"), "cylinder")
         radius = ring.roller_radius * np.sqrt(1 - (half_length / ring.semi_axis) ** 2)
         _add(cylinder, "radius", text=_number(radius))
         _add(cylinder, "length", text=_number(2 * half_length))
-        _add_shape(link, "visual", f"barrel_{step}", cylinder, rotation=Z_TO_ROLLER_AXIS, color=color)
+        _add_shape(
+            link,
+            "visual",
+            f"{prefix}_{step}",
+            cylinder,
+            position=center,
+            rotation=rotation * Z_TO_ROLLER_AXIS,
+            color=ROLLER_COLORS[index % 2],
+        )
 
 
 def _add_joint(
     model: etree._Element,
     name: str,
-    parent: str,
+    parent: str | None,
     child: str | None,
     axis: str,
     effort: float,
@@ -200,6 +234,8 @@ def _add_contact(collision: etree._Element, robot: Robot, *, friction: float) ->
     _drake(properties, "mu_static", text=_number(friction))
     _drake(properties, "point_contact_stiffness", text=_number(contact_stiffness(robot), digits=6))
     _drake(properties, "hunt_crossley_dissipation", text=_number(contact_dissipation(robot), digits=6))
+    # Of Drake's SAP only, which otherwise lets contacts creep.
+    _drake(properties, "relaxation_time", text="0")
 
 
 def _add_pose(

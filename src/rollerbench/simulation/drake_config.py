@@ -12,6 +12,9 @@ from rollerbench.simulation.scenario import Scenario
 
 Config = TypeVar("Config", MultibodyPlantConfig, SimulatorConfig)
 
+NEAR_RIGID = 0.1
+"""Drake's sap_near_rigid_threshold of the fast contact approximation: contacts stiffer than the step resolves [-]."""
+
 OURS = {
     "discrete_contact_approximation": "use plant.contact_approximation",
     "start_time": "a run starts at 0",
@@ -26,12 +29,15 @@ def plant_config(scenario: Scenario) -> MultibodyPlantConfig:
         DescriptionError: an unknown field, or a value of the wrong kind.
     """
     settings = scenario.plant
+    fast = settings.contact_approximation == "fast"
     config = MultibodyPlantConfig(
         time_step=settings.time_step,
         contact_model="point",
-        discrete_contact_approximation=settings.contact_approximation,
+        discrete_contact_approximation="sap" if fast else settings.contact_approximation,
         use_sampled_output_ports=False,
     )
+    if fast:
+        config.sap_near_rigid_threshold = NEAR_RIGID
     return _apply("plant", config, settings.model_extra or {})
 
 

@@ -11,6 +11,7 @@ from pydrake.systems.framework import Context
 
 from rollerbench.errors import DescriptionError, SimulationError
 from rollerbench.kinematics.profile import reference_poses
+from rollerbench.plant import follow_rollers
 from rollerbench.simulation.drake_config import simulator_config
 from rollerbench.simulation.log import Progress, Simulated, provenance, recording_of, station_samples
 from rollerbench.simulation.scenario import Scenario
@@ -26,8 +27,9 @@ def simulate(scenario: Scenario, *, meshcat: Meshcat | None = None, progress: Pr
         DescriptionError: Drake refuses a setting.
         SimulationError: the robot cannot stand.
     """
-    station = Station(scenario, meshcat=meshcat, log=True)
+    station = Station(scenario, meshcat=meshcat, log=True, visuals=meshcat is not None)
     simulator = Simulator(station)
+    follow_rollers(simulator)
     try:
         ApplySimulatorConfig(simulator_config(scenario), simulator)
     except (RuntimeError, ValueError, SystemExit) as error:
@@ -52,8 +54,9 @@ def simulate(scenario: Scenario, *, meshcat: Meshcat | None = None, progress: Pr
 
 def _stand_at_rest(simulator: Simulator, station: Station, scenario: Scenario) -> None:
     """Starts the robot at the origin, at rest, its weight on its wheels as a moment of standing still leaves it."""
-    trial = Station(scenario, command="external")
+    trial = Station(scenario, command="external", visuals=False)
     waiting = Simulator(trial)
+    follow_rollers(waiting)
     trial.GetInputPort("v_xyw_B").FixValue(waiting.get_mutable_context(), np.zeros(3))
     model, plant_context = trial.parts.model, _plant_context(trial, waiting)
     model.set_pose(plant_context, (0.0, 0.0, 0.0))

@@ -2,7 +2,7 @@
 
 import platform
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from typing import Any
 
@@ -38,6 +38,7 @@ class Samples:
         measured: Their measured speeds (n, n_driven) [rad/s].
         effort: Torques (n, n_driven) of their motors [N m].
         odometry: Poses (n, 3) from the measured speeds [m, m, rad].
+        first_roller: First simulated rollers (n,) of wheels of whose rollers only some are, by name.
     """
 
     time: Array
@@ -46,6 +47,7 @@ class Samples:
     measured: Array
     effort: Array
     odometry: Array
+    first_roller: Mapping[str, Array] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -95,7 +97,7 @@ def station_samples(station: Station, scenario: Scenario, context: Context) -> S
     finite = np.all([np.isfinite(rows[:count]).all(axis=1) for rows in data.values()], axis=0)
     end = count if finite.all() else int(np.argmin(finite))
     data = {name: rows[:end] for name, rows in data.items()}
-    motion, measured = robot_motion(model, data["state"]), data["wheel_speeds"]
+    motion, measured = robot_motion(model, data["state"], time[:end], data.get("rollers")), data["wheel_speeds"]
     actuated = [actuator.joint().name() for actuator in model.actuators]
     driven = [actuated.index(model.drive_joint(wheel).name()) for wheel in model.robot.driven_wheels]
     return Samples(
@@ -107,6 +109,9 @@ def station_samples(station: Station, scenario: Scenario, context: Context) -> S
         odometry=odometry_poses(scenario, measured, motion, scenario.plant.time_step)
         if scenario.motion.steers
         else data["odometry_q_xyt"],
+        first_roller={}
+        if model.roller_window is None
+        else {name: data["rollers"][:, offset] for name, offset in model.roller_window.offsets.items()},
     )
 
 
@@ -137,8 +142,13 @@ def recording_of(samples: Samples, scenario: Scenario, metadata: Mapping[str, An
     return Recording(columns=columns, wheel_names=scenario.robot.wheel_names, metadata=metadata)
 
 
-def robot_motion(model: RobotModel, state: Array) -> RobotMotion:
-    """The motion in states (n, nq + nv) of a robot's model instance."""
+def robot_motion(
+    model: RobotModel, state: Array, time: Array | None = None, remembered: Array | None = None
+) -> RobotMotion:
+    """The motion in states (n, nq + nv) of a robot's model instance.
+
+    Of a robot with windowed rollers with the times (n,) and the states of its roller window.
+    """
     nq = model.plant.num_positions(model.model_instance)
     q, v = state[:, :nq], state[:, nq:]
     iq, iv = model.body_position_index, model.body_velocity_index
@@ -152,6 +162,10 @@ def robot_motion(model: RobotModel, state: Array) -> RobotMotion:
             rates[row, :, index] = v[:, model.velocity_index(joint)]
         if wheel.ring:
             rollers[wheel.name] = v[:, [model.velocity_index(joint) for joint in model.roller_joints(wheel)]]
+        window = model.roller_window
+        if window is not None and wheel.name in window.windows and remembered is not None and time is not None:
+            hub = np.array([angles[0][:, index], rates[0][:, index], v[:, iv + 2]])
+            rollers[wheel.name] = window.roller_speeds(wheel.name, rollers[wheel.name], remembered, time, hub)
     return RobotMotion(
         p_WB=q[:, iq + 4 : iq + 7],
         R_WB=Rotation.from_quat(q[:, iq : iq + 4], scalar_first=True).as_matrix(),
@@ -191,7 +205,11 @@ def _wheel_columns(robot: Robot, samples: Samples) -> dict[str, Array]:
             "speed": samples.motion.wheel_speeds[:, index],
             **{name: of[:, driven.index(wheel.name)] if wheel.driven else missing for name, of in motor.items()},
             "swivel": samples.motion.swivel_angles[:, index],
+            "first_roller": samples.first_roller.get(wheel.name, missing),
         }
+        if wheel.name in samples.motion.roller_speeds:
+            speeds = samples.motion.roller_speeds[wheel.name]
+            values |= {f"roller_{k:02d}": speeds[:, k] for k in range(speeds.shape[1])}
         columns |= {f"{wheel.name}.{name}": value for name, value in values.items()}
     return columns
 

@@ -23,6 +23,7 @@ from rollerbench.kinematics.motion import Motion, twist_motion, wheel_motion
 from rollerbench.kinematics.profile import reference_poses
 from rollerbench.resources import scenario_file
 from rollerbench.sdf.servo import DRIVE_TIME_CONSTANT
+from rollerbench.sdf.window import DEFAULT_SIZE, size_on_bumps
 from rollerbench.simulation.commands import Command, WheelSpeedsCommand
 from rollerbench.simulation.imperfections import Errors
 
@@ -40,20 +41,36 @@ class OpenLoop(Part):
     rollers: Literal["textbook", "finite"] = "textbook"
 
 
+UNFIT = {
+    "sap": "lets wheels creep over the ground by percents of the path",
+    "tamsi": "ignores the wheels' servos, and is gone from newer Drake",
+}
+"""Drake's other contact approximations, and why they are refused."""
+
+
+def _no_creep(value: Any) -> Any:
+    if isinstance(value, str) and value in UNFIT:
+        raise ValueError(f"it {UNFIT[value]}; accepted: lagged, similar, or fast (SAP with nearly rigid contacts)")
+    return value
+
+
 class PlantSettings(Part):
     """How Drake simulates. Any further field of Drake's MultibodyPlantConfig is passed on.
 
     Attributes:
-        roller_model: "full": every roller is a body.
+        roller_model: "full": every roller is a body; "windowed": those near the ground are.
+        roller_window: How many rollers of a wheel are simulated, if windowed; bumps may need more than that.
         time_step: Step of the discrete plant [s].
-        contact_approximation: Drake's discrete contact approximation. The others creep or ignore the servos.
+        contact_approximation: Drake's discrete contact approximation, "lagged" or "similar"; or "fast", its SAP with
+            nearly rigid contacts, which is for wheels that roll: where they slide for long, they bounce.
     """
 
     model_config = ConfigDict(extra="allow")
 
-    roller_model: Literal["full"] = "full"
+    roller_model: Literal["windowed", "full"] = "windowed"
+    roller_window: Annotated[int, Field(strict=True, ge=2)] = DEFAULT_SIZE
     time_step: Annotated[Positive, Field(ge=1e-5, le=0.1)] = 0.005
-    contact_approximation: Literal["lagged", "similar"] = "lagged"
+    contact_approximation: Annotated[Literal["lagged", "similar", "fast"], BeforeValidator(_no_creep)] = "lagged"
 
 
 class Ground(Part):
@@ -176,6 +193,12 @@ class Scenario(Part):
         times = np.arange(0.0, self.duration, self.plant.time_step)
         path = reference_poses(self.motion.twist, times)
         return self.errors.ground_bumps.scattered(self.simulated_robot, path, self.seed)
+
+    @property
+    def window_size(self) -> int:
+        """Number of simulated rollers of a windowed wheel: as many as the ground needs."""
+        bumps = self.errors.ground_bumps
+        return max(self.plant.roller_window, 0 if bumps is None else size_on_bumps(self.simulated_robot, bumps.height))
 
     @cached_property
     def motion(self) -> Motion:

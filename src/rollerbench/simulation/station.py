@@ -48,6 +48,8 @@ class StationParts:
 class Station(Diagram):
     """A robot on its ground, driven by a scenario's command.
 
+    Where rollers are windowed, as they are by default, call `follow_rollers(simulator)` before the simulation.
+
     Input ports:
         v_xyw_B (3): body twist command [m/s, m/s, rad/s]; only if the command comes from outside.
     Output ports:
@@ -58,6 +60,7 @@ class Station(Diagram):
         wheel_speeds (n_driven): wheel speeds that the encoders measure [rad/s].
         net_actuation (n_actuators): torques of the servos [N m].
         odometry_q_xyt (3): pose from these measured wheel speeds [m, m, rad].
+        rollers (...): state of the `RollerWindow`; only if rollers are windowed.
         contact_results: Drake's ContactResults.
         query_object: Drake's QueryObject.
 
@@ -74,6 +77,7 @@ class Station(Diagram):
         command: Literal["scenario", "external"] = "scenario",
         meshcat: Meshcat | None = None,
         log: bool = False,
+        visuals: bool = True,
     ) -> None:
         """Builds the diagram of a scenario.
 
@@ -82,6 +86,7 @@ class Station(Diagram):
             command: "scenario" drives the robot as the scenario says; "external" exports the input v_xyw_B.
             meshcat: Where to show the robot.
             log: Whether to record outputs (see `StationParts.logs`).
+            visuals: Whether the robot shall be seen, in the meshcat or by what is connected to query_object.
 
         Raises:
             DescriptionError: Drake refuses a setting of the plant.
@@ -91,7 +96,15 @@ class Station(Diagram):
         builder = DiagramBuilder()
         plant, scene_graph = _add_plant(builder, scenario)
         gains = servo_gains(scenario.robot, time_constant=scenario.controller.servo_time_constant)
-        model = add_robot(plant, scenario.simulated_robot, gains=gains)
+        model = add_robot(
+            plant,
+            scenario.simulated_robot,
+            gains=gains,
+            roller_model=scenario.plant.roller_model,
+            builder=builder,
+            window_size=scenario.window_size,
+            visuals=visuals,
+        )
         _add_ground(plant, scenario, drawn=meshcat is not None)
         plant.Finalize()
 
@@ -106,6 +119,8 @@ class Station(Diagram):
             "contact_results": plant.get_contact_results_output_port(),
             "query_object": scene_graph.get_query_output_port(),
         }
+        if model.roller_window is not None:
+            outputs["rollers"] = model.roller_window.GetOutputPort("rollers")
         body = builder.AddNamedSystem("body_state", MatrixGain(model.body_state_matrix()))
         builder.Connect(outputs["state"], body.get_input_port())
         planar = builder.AddNamedSystem("planar_state", PlanarState())
@@ -119,7 +134,8 @@ class Station(Diagram):
 
         logs = {}
         if log:
-            for name in ("state", "wheel_speed_command", "wheel_speeds", "net_actuation", "odometry_q_xyt"):
+            recorded = ("state", "wheel_speed_command", "wheel_speeds", "net_actuation", "odometry_q_xyt", "rollers")
+            for name in outputs.keys() & set(recorded):
                 logs[name] = LogVectorOutput(outputs[name], builder, publish_period=scenario.plant.time_step)
         if meshcat is not None:
             add_meshcat(builder, scene_graph, meshcat, scenario.recording.frames_per_second)

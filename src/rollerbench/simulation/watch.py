@@ -9,6 +9,7 @@ from pydrake.systems.framework import Context
 from rollerbench.description import Robot
 from rollerbench.plant import RobotModel
 from rollerbench.sdf.contact import static_penetration
+from rollerbench.sdf.window import reach
 
 Array = NDArray[np.float64]
 
@@ -33,12 +34,25 @@ def fault(model: RobotModel, context: Context) -> str | None:
     if not np.isfinite(state).all():
         return NOT_FINITE
     pose = model.plant.EvalBodyPoseInWorld(context, model.body)
-    return wrong_pose(model.robot, pose.translation(), pose.rotation().matrix())
+    what = wrong_pose(model.robot, pose.translation(), pose.rotation().matrix())
+    return what or _beyond_window(model, pose.rotation().matrix())
+
+
+def _beyond_window(model: RobotModel, R_WB: Array) -> str | None:
+    """Whether a wheel leans on rollers that are not simulated."""
+    window = model.roller_window
+    tilt = _tilt(R_WB)
+    if window is None or tilt <= min(map(reach, window.windows.values())):
+        return None
+    return (
+        f"the robot is inclined by {math.degrees(tilt):.0f} deg, and the simulated rollers around the bottoms of its "
+        "wheels do not reach as far; accepted: a larger plant.roller_window, or plant.roller_model: full"
+    )
 
 
 def wrong_pose(robot: Robot, p_WB: Array, R_WB: Array) -> str | None:
     """What is wrong with the pose of a robot's body, position (3,) and rotation (3, 3), on level ground, or None."""
-    tilt = math.acos(min(1.0, max(-1.0, float(R_WB[2, 2]))))
+    tilt = _tilt(R_WB)
     if tilt > TIP_ANGLE:
         return f"the robot tipped over: its body is inclined by {math.degrees(tilt):.0f} deg"
     rise = float(p_WB[2]) + robot.ground_height + static_penetration(robot)
@@ -48,3 +62,8 @@ def wrong_pose(robot: Robot, p_WB: Array, R_WB: Array) -> str | None:
     if rise < -allowed:
         return f"the robot fell through the ground: its body sank by {-rise:.3g} m"
     return None
+
+
+def _tilt(R_WB: Array) -> float:
+    """Angle from B's z axis to the vertical [rad]."""
+    return math.acos(min(1.0, max(-1.0, float(R_WB[2, 2]))))
