@@ -90,12 +90,12 @@ def _measured(
         raise typer.BadParameter("none of these is installed", param_hint="--engine")
     for message in missing:
         console.print(f"[yellow]{escape(message)}[/yellow]")
-    duration = {"smoke": 0.4, "quick": 1.5}.get(effort, 3.0)
+    duration = {"smoke": 0.4, "quick": 2.5}.get(effort, 3.0)
     by_name = {each.name: each for each in engines}
     families = [family for family in FAMILIES if family.split()[0] in by_name]
     robot = robot_with_rollers()
     # The ramps are long enough for the friction of wheels that move sideways at top speed.
-    ramp = {"smoke": 0.2, "quick": 0.375}.get(effort, 0.5)
+    ramp = 0.2 if effort == "smoke" else 0.5
     moves = motions(robot, duration=duration, ramp=ramp, names=("y",) if effort == "smoke" else tuple(TWISTS))
     settings = scaling.SETTINGS[::3] if effort == "smoke" else scaling.SETTINGS
     rollers = {"smoke": (6,), "quick": (6, 12, 24)}.get(effort, scaling.ROLLER_COUNTS)
