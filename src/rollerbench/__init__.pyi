@@ -22,6 +22,7 @@ from .errors import RollerbenchWarning as RollerbenchWarning
 from .errors import SimulationError as SimulationError
 from .kinematics import Mobility as Mobility
 from .kinematics import WheelKinematics as WheelKinematics
+from .kinematics import limits as limits
 from .kinematics import odometry as odometry
 from .plant import RobotModel as RobotModel
 from .plant import add_ground as add_ground

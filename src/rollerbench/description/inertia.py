@@ -8,6 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+GRAVITY = 9.81
+"""Standard value used for loads and derived parameters; Drake's default too [m/s2]."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RigidInertia:

@@ -3,9 +3,7 @@
 import math
 
 from rollerbench.description import Robot
-
-GRAVITY = 9.81
-"""Standard value used for derived parameters; Drake's default too [m/s2]."""
+from rollerbench.description.inertia import GRAVITY
 
 PENETRATION_RATIO = 5e-4
 """Static penetration of a wheel into rigid ground, as a share of its radius: by so much the wheel rolls short [-]."""

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from rollerbench.description.inertia import GRAVITY
 from rollerbench.errors import DescriptionError, ResourceError, SimulationError
 from rollerbench.kinematics.contact import RobotMotion
 from rollerbench.sdf import names
-from rollerbench.sdf.contact import GRAVITY
 from rollerbench.sdf.mjcf import DEFAULT_STEP, robot_to_mjcf
 from rollerbench.sdf.servo import ServoGains, servo_gains
 from rollerbench.simulation.log import Progress, Samples, Simulated, odometry_poses, provenance, recording_of
