@@ -87,14 +87,3 @@ def roller_poses_H(wheel: RollerWheel) -> list[tuple[NDArray[np.float64], NDArra
     bottom = Rotation.from_euler("z", ring.roller_angle + 0.5 * np.pi)
     rotations = Rotation.from_rotvec(ring.angles[:, np.newaxis] * [0.0, 1.0, 0.0]) * bottom
     return list(zip(rotations.as_matrix(), ring.centers_H, strict=True))
-
-
-def spin_inertia(wheel: Wheel) -> float:
-    """Rotational inertia of a wheel about its axle, rollers included [kg m2]."""
-    moment = hub_inertia(wheel).moment[1, 1]
-    if isinstance(wheel, RollerWheel):
-        roller = roller_inertia(wheel)
-        for rotation, center in roller_poses_H(wheel):
-            own = rotation @ roller.moment @ rotation.T
-            moment += own[1, 1] + roller.mass * (center[0] ** 2 + center[2] ** 2)
-    return float(moment)

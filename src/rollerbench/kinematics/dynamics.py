@@ -8,14 +8,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from rollerbench.description.mass import axle_inertia, roller_inertia
 from rollerbench.description.wheels import RollerWheel
+from rollerbench.kinematics.limits import wheel_loads
 from rollerbench.kinematics.mobility import null_space
 from rollerbench.kinematics.profile import Profile
 from rollerbench.kinematics.wheels import WheelKinematics
 
 Array = NDArray[np.float64]
-
-GRAVITY = 9.81
-"""Acceleration of gravity, as Drake's default [m/s2]."""
 
 SLOW = 1e-3
 """Speed below which rolling resistance falls off [m/s]: a tanh instead of a sign."""
@@ -51,12 +49,8 @@ class RollingDynamics:
 
     @cached_property
     def static_loads(self) -> Array:
-        """Loads (n_wheels,) at rest [N]: of all that carry the weight, those of equally stiff contacts."""
-        robot = self.kinematics.robot
-        places = np.array([[1.0, *point[:2]] for point in robot.contact_points_B]).T
-        x, y = robot.inertia.com[:2]
-        loads: Array = np.linalg.lstsq(places, robot.mass * GRAVITY * np.array([1.0, x, y]), rcond=None)[0]
-        return loads
+        """Loads (n_wheels,) at rest [N], castors behind (`limits.wheel_loads`)."""
+        return wheel_loads(self.kinematics.robot, 0.0, 0.0)
 
     @cached_property
     def mass_matrix(self) -> Array:
