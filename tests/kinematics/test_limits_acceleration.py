@@ -157,7 +157,7 @@ def test_efforts_make_the_acceleration(name: str, direction: float, acceleration
     radius = np.array([wheel.radius for wheel in robot.wheels])
     rings = [i for i, wheel in enumerate(robot.wheels) if wheel.ring]
     spin = np.array([spin_inertia(wheel) for wheel in robot.wheels])
-    roller = [float(roller_inertia(robot.wheels[i]).moment[0, 0] / robot.wheels[i].rollers.radius**2) for i in rings]
+    roller = [float(roller_inertia(robot.wheels[i]).moment[0, 0] / robot.wheels[i].rollers.radius ** 2) for i in rings]
     rest, com = robot.inertia, _mass_centre(robot, u)
     moved = np.array([[1, 0, -com[1]], [0, 1, com[0]], [0, 0, 1]])
     body = moved.T @ np.diag([rest.mass, rest.mass, rest.moment[2, 2]]) @ moved
@@ -295,7 +295,7 @@ def test_linear_objectives_over_balls(seed: int) -> None:
     assert feasible.all()
     expected = np.sum(objective * center, axis=1) + radius * np.linalg.norm(objective, axis=1)
     assert np.sum(objective * z, axis=1) == pytest.approx(expected, abs=1e-9)
-    far = np.concatenate([constant, constant + [0.0, 10.0, 0.0]], axis=1)
+    far = np.concatenate([constant, constant + np.array([0.0, 10.0, 0.0])], axis=1)
     far[:, :, 0] = 1.0
     both = Cones(constant=far, slope=np.concatenate([slope, slope], axis=1))
     z, feasible = maximize(objective, both)

@@ -18,7 +18,9 @@ def paper_robot(delta_deg: float) -> Robot:
     template = _with_inertias(robot.wheels[0])
     wheels = tuple(
         # Far enough from Bo for wheels 30 deg apart; translations do not depend on it.
-        template.model_copy(update={"name": wheel.name, "azimuth_deg": azimuth, "distance": 0.28 if delta_deg >= 60 else 0.4})
+        template.model_copy(
+            update={"name": wheel.name, "azimuth_deg": azimuth, "distance": 0.28 if delta_deg >= 60 else 0.4}
+        )
         for wheel, azimuth in zip(robot.wheels, azimuths, strict=True)
     )
     body = robot.body.model_copy(update={"mass": WEIGHT / 9.8 - 4 * template.mass})
