@@ -135,6 +135,35 @@ def reproduce(
         _print(f"Written: {done.folder / 'report.html'}")
 
 
+@app.command(epilog="Example: rollerbench analyze omni_platform -o analyses/omni --roll-resistance 0.02")
+def analyze(
+    robot: Annotated[str, typer.Argument(help="Name of a shipped robot, or path to a robot.yaml.")],
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Folder to write.", show_default="analyses/NAME")
+    ] = None,
+    roll_resistance: Annotated[
+        float, typer.Option(help="Resisting force of a rolling wheel or roller over its load.")
+    ] = 0.0,
+    ground_friction: Annotated[
+        float | None, typer.Option(help="Coefficient of friction of the ground.", show_default="the wheels' own")
+    ] = None,
+) -> None:
+    """Show what a robot can do in each direction: speed, acceleration before a wheel slips, wheel efforts."""
+    from rollerbench import studies
+    from rollerbench.report.analysis import analysis_table
+
+    with _progress(robot, 0.0, unit="steps") as show:
+        done = studies.analyze(
+            robot,
+            output=output,
+            roll_resistance=roll_resistance,
+            ground_friction=ground_friction,
+            progress=lambda now, total: show(now, total=total),
+        )
+    _print(analysis_table(done.capability))
+    _print(f"Written: {done.folder / 'report.html'}")
+
+
 @app.command(epilog="Example: rollerbench build youbot_base")
 def build(
     robots: Annotated[
@@ -235,12 +264,13 @@ class Show(Protocol):
 
 
 @contextmanager
-def _progress(label: str, total: float) -> Iterator[Show]:
-    """A progress bar on the terminal's standard error, in simulated seconds; nothing elsewhere."""
+def _progress(label: str, total: float, unit: str = "s") -> Iterator[Show]:
+    """A progress bar on the terminal's standard error, in simulated seconds or another unit; nothing elsewhere."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed:.2f}/{task.total:g} s"))
+    amount = TextColumn("{task.completed:.2f}/{task.total:g} s" if unit == "s" else f"{{task.completed:.0f}} {unit}")
+    columns = (TextColumn("{task.description}"), BarColumn(), amount)
     console = Console(stderr=True)
     with Progress(
         *columns, TimeRemainingColumn(), console=console, transient=True, disable=not console.is_terminal

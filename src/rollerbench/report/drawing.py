@@ -4,12 +4,14 @@ import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import cycle
+from typing import cast
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
+from matplotlib.projections.polar import PolarAxes
 from numpy.typing import NDArray
 
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#F0E442")
@@ -66,6 +68,18 @@ def new_figure(rows: int) -> tuple[Figure, list[Axes]]:
     for each in axes:
         each.grid(visible=True, color="0.9")
         each.set_axisbelow(True)
+    return figure, axes
+
+
+def new_polar_figure() -> tuple[Figure, PolarAxes]:
+    """A figure over directions of travel: forward is up, left is left."""
+    figure = Figure(figsize=(7.0, 5.6), layout="constrained")
+    axes = cast(PolarAxes, figure.add_subplot(projection="polar"))
+    axes.set_theta_zero_location("N")
+    axes.set_thetagrids(range(0, 360, 30))
+    axes.set_rlabel_position(75)
+    axes.grid(visible=True, color="0.88")
+    axes.set_axisbelow(True)
     return figure, axes
 
 

@@ -1,8 +1,7 @@
 """Reproduces a paper: runs its scenarios, then writes figures, numbers and a page."""
 
 import json
-import tempfile
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,11 +11,12 @@ from rollerbench.report.reproduction import reproduction_page
 from rollerbench.simulation import RunResult, run
 from rollerbench.simulation.log import versions
 from rollerbench.studies import differential_drive, mecanum, six_wheel
+from rollerbench.studies.folder import claim, write_figures
 from rollerbench.studies.paper import Findings, Paper
 
 PAPERS = {paper.name: paper for paper in (six_wheel.PAPER, differential_drive.PAPER, mecanum.PAPER)}
 
-FILES = {"figures", "results.json", "report.html", "runs"}
+FILES, FOLDERS = {"results.json", "report.html"}, {"figures", "runs"}
 """Everything that a reproduction writes, and so may replace."""
 
 Progress = Callable[[float, str, float], None]
@@ -63,7 +63,7 @@ def reproduce(
     if paper not in PAPERS:
         raise ResourceError(f"no paper '{paper}'; accepted: {', '.join(PAPERS)}")
     folder, chosen = Path(output), PAPERS[paper]
-    earlier = _check(folder)
+    earlier = claim(folder, files=FILES, folders=FOLDERS, index="results.json", what="reproduction")
     # The page of an earlier reproduction does not belong to the runs that are about to replace its runs.
     for name in ("report.html", "results.json"):
         (folder / name).unlink(missing_ok=True)
@@ -88,44 +88,13 @@ def _shifted(progress: Progress, name: str, before: float, total: float) -> Call
     return lambda now: progress(before + now, name, total)
 
 
-def _check(folder: Path) -> set[str]:
-    """Checks that a reproduction may be written there; returns the names of an earlier one's figures."""
-    accepted = "accepted: a new folder, or that of an earlier reproduction"
-    if folder.exists() and not folder.is_dir():
-        raise ResourceError(f"{folder}: is a file; {accepted}")
-    foreign = sorted({path.name for path in folder.iterdir()} - FILES) if folder.is_dir() else []
-    if foreign:
-        raise ResourceError(f"{folder}: holds something else ({', '.join(foreign[:3])}); {accepted}")
-    for name in FILES:
-        path, is_folder = folder / name, name in ("figures", "runs")
-        if path.exists() and path.is_dir() != is_folder:
-            raise ResourceError(f"{path}: is {'a file' if is_folder else 'a folder'}; {accepted}")
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        tempfile.TemporaryFile(dir=folder).close()
-        earlier = json.loads((folder / "results.json").read_text(encoding="utf-8"))["figures"]
-        return {name for name in earlier if isinstance(name, str)}
-    except (FileNotFoundError, ValueError, KeyError, TypeError):
-        return set()
-    except OSError as error:
-        raise ResourceError(f"{folder}: cannot be written: {error}") from error
-
-
-def _write(
-    folder: Path, paper: Paper, findings: Findings, runs: Mapping[str, RunResult], earlier: Collection[str]
-) -> None:
-    (folder / "figures").mkdir(exist_ok=True)
-    drawn = {f"{picture.name}.svg": picture.svg for picture in findings.pictures}
-    for name, svg in drawn.items():
-        write_atomically(folder / "figures" / name, svg)
-    for old in (folder / "figures").glob("*.svg"):
-        if old.name in earlier and old.name not in drawn:
-            old.unlink()
+def _write(folder: Path, paper: Paper, findings: Findings, runs: Mapping[str, RunResult], earlier: set[str]) -> None:
+    drawn = write_figures(folder, {picture.name: picture.svg for picture in findings.pictures}, earlier)
     results = {
         "paper": paper.name,
         "citation": paper.citation,
         "versions": versions(),
-        "figures": sorted(drawn),
+        "figures": drawn,
         "results": [result.to_dict() for result in findings.results],
         "mistakes": [mistake.to_dict() for mistake in findings.mistakes],
         "runs": {name: result.summary for name, result in runs.items()},

@@ -137,7 +137,7 @@ def _cones(model: ContactForces, friction: Array, adhesion: str) -> tuple[Cones,
     robot, count = model.robot, len(model.u)
     share = robot.mass * GRAVITY / len(robot.wheels)
     constant, slope, owners, kinds = [], [], [], []
-    for wheel in np.flatnonzero(model.carrying):
+    for wheel in np.flatnonzero(model.carrying).tolist():
         bound = friction[wheel] * model.loads.constant[:, wheel] / share
         bound_slope = friction[wheel] * model.loads.slope[:, wheel] / share
         for axes in ((0, 1),) if adhesion == "circle" else ((0,), (1,)):

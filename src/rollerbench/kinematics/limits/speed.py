@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rollerbench.description import Robot, load_robot
 from rollerbench.errors import KinematicsError
-from rollerbench.kinematics.limits.result import Limit, finite, finite_number, unit_vectors
+from rollerbench.kinematics.limits.result import Limit, finite, unit_vectors
 from rollerbench.kinematics.rows import wheel_rows
 
 Array = NDArray[np.float64]
@@ -75,7 +75,7 @@ def speed_rows(robot: Robot) -> SpeedRows:
 
 
 def max_speed(
-    robot: Robot | str | Path, direction: ArrayLike, *, yaw_rate: float = 0.0, curvature: float = 0.0
+    robot: Robot | str | Path, direction: ArrayLike, *, yaw_rate: ArrayLike = 0.0, curvature: ArrayLike = 0.0
 ) -> Limit:
     """Largest speed of Bo in each direction, such that no driven wheel exceeds its max_speed and no tyre skids.
 
@@ -86,23 +86,27 @@ def max_speed(
     Args:
         robot: Robot, name of a shipped one, or path to a robot.yaml.
         direction: Directions of travel (...) [rad] from body x, counter-clockwise.
-        yaw_rate: Yaw rate that the robot has besides [rad/s].
-        curvature: Yaw rate per speed [1/m]: the centre of rotation lies 1/curvature to the left of the travel.
+        yaw_rate: Yaw rates (...) that the robot has besides [rad/s].
+        curvature: Yaw rates per speed (...) [1/m]: the centre of rotation lies 1/curvature to the left of the travel.
+            All three broadcast.
 
     Returns:
         Speeds (...) [m/s]; causes "speed" or, with a yaw rate, "tyres" where they allow one speed alone. Where there is
         none, NaN: "tyres" (forbidden), "speed" (the yaw rate alone is too much), "unlimited".
 
     Raises:
-        KinematicsError: an argument is not finite, or both yaw_rate and curvature are given.
+        KinematicsError: an argument is not finite, or they do not broadcast, or both yaw_rate and curvature are given.
     """
     robot = load_robot(robot)
-    yaw_rate, curvature = finite_number("yaw_rate", yaw_rate), finite_number("curvature", curvature)
-    if yaw_rate and curvature:
-        raise KinematicsError(f"yaw_rate = {yaw_rate}, curvature = {curvature}: accepted: one of them")
-    shape, u = unit_vectors(direction)
-    per_speed = np.column_stack([u, np.full(len(u), curvature)])
-    return _largest(robot, shape, per_speed, yaw_rate)
+    turns = finite("yaw_rate", yaw_rate), finite("curvature", curvature)
+    if turns[0].any() and turns[1].any():
+        raise KinematicsError(f"yaw_rate = {yaw_rate!r}, curvature = {curvature!r}: accepted: one of them")
+    try:
+        angle, yaw_rates, curvatures = np.broadcast_arrays(finite("direction", direction), *turns)
+    except ValueError as error:
+        raise KinematicsError(f"direction, yaw_rate and curvature: {error}") from error
+    shape, u = unit_vectors(angle)
+    return _largest(robot, shape, np.column_stack([u, curvatures.ravel()]), yaw_rates.ravel())
 
 
 def max_yaw_rate(robot: Robot | str | Path, p_BoICR_B: ArrayLike = (0.0, 0.0)) -> Limit:
@@ -123,11 +127,11 @@ def max_yaw_rate(robot: Robot | str | Path, p_BoICR_B: ArrayLike = (0.0, 0.0)) -
     if centers.ndim == 0 or centers.shape[-1] != 2:
         raise KinematicsError(f"p_BoICR_B has shape {centers.shape}: accepted: (..., 2)")
     x, y = centers.reshape(-1, 2).T
-    return _largest(robot, centers.shape[:-1], np.column_stack([y, -x, np.ones_like(x)]), 0.0)
+    return _largest(robot, centers.shape[:-1], np.column_stack([y, -x, np.ones_like(x)]), np.zeros_like(x))
 
 
-def _largest(robot: Robot, shape: tuple[int, ...], per_s: Array, yaw_rate: float) -> Limit:
-    """Largest s >= 0 at which the twists s per_s (n, 3) + [0, 0, yaw_rate] are allowed."""
+def _largest(robot: Robot, shape: tuple[int, ...], per_s: Array, yaw_rate: Array) -> Limit:
+    """Largest s >= 0 at which the twists s per_s (n, 3) + [0, 0, yaw_rate (n,)] are allowed."""
     rows = speed_rows(robot)
     size = np.linalg.norm(per_s * [1.0, 1.0, rows.length], axis=1)[:, np.newaxis]
     parts = [_driven(rows, per_s, yaw_rate, size), _steered(rows, per_s, yaw_rate, size)]
@@ -155,18 +159,18 @@ def _largest(robot: Robot, shape: tuple[int, ...], per_s: Array, yaw_rate: float
 # Smallest and largest s (n, columns) that each wheel allows; an empty interval is (inf, inf).
 
 
-def _driven(rows: SpeedRows, per_s: Array, yaw_rate: float, size: Array) -> tuple[Array, Array]:
-    per, fixed = per_s @ rows.rows.T, yaw_rate * rows.rows[:, 2]
+def _driven(rows: SpeedRows, per_s: Array, yaw_rate: Array, size: Array) -> tuple[Array, Array]:
+    per, fixed = per_s @ rows.rows.T, np.outer(yaw_rate, rows.rows[:, 2])
     still, over = np.abs(per) <= NOTHING * size, np.abs(fixed) > rows.speeds
     pace, shift = np.where(still, 1.0, np.abs(per)), np.sign(per) * fixed
     low = np.where(still, np.where(over, np.inf, -np.inf), (-rows.speeds - shift) / pace)
     return low, np.where(still, np.inf, (rows.speeds - shift) / pace)
 
 
-def _steered(rows: SpeedRows, per_s: Array, yaw_rate: float, size: Array) -> tuple[Array, Array]:
+def _steered(rows: SpeedRows, per_s: Array, yaw_rate: Array, size: Array) -> tuple[Array, Array]:
     """|s p + r| <= c, with p the velocity per s at the wheel's place and r that by the yaw rate."""
     turn = np.column_stack([-rows.places[:, 1], rows.places[:, 0]])
-    p, r = per_s[:, np.newaxis, :2] + per_s[:, np.newaxis, 2:] * turn, yaw_rate * turn
+    p, r = per_s[:, np.newaxis, :2] + per_s[:, np.newaxis, 2:] * turn, yaw_rate[:, np.newaxis, np.newaxis] * turn
     a, b = np.sum(p**2, axis=-1), np.sum(p * r, axis=-1)
     c = np.sum(r**2, axis=-1) - rows.steered_speeds**2
     still = np.sqrt(a) <= NOTHING * size
@@ -177,11 +181,11 @@ def _steered(rows: SpeedRows, per_s: Array, yaw_rate: float, size: Array) -> tup
     return low, np.where(empty | still, np.inf, (-b + root) / a)
 
 
-def _tyres(rows: SpeedRows, per_s: Array, yaw_rate: float, size: Array) -> tuple[Array, Array]:
+def _tyres(rows: SpeedRows, per_s: Array, yaw_rate: Array, size: Array) -> tuple[Array, Array]:
     """A tyre allows every s, or the only one at which it does not skid, or none."""
-    per, fixed = per_s @ rows.tyre_rows.T, yaw_rate * rows.tyre_rows[:, 2]
+    per, fixed = per_s @ rows.tyre_rows.T, np.outer(yaw_rate, rows.tyre_rows[:, 2])
     free = np.abs(per) <= NOTHING * size
-    skids = np.abs(fixed) > NOTHING * abs(yaw_rate) * rows.length
+    skids = np.abs(fixed) > NOTHING * np.abs(yaw_rate)[:, np.newaxis] * rows.length
     only = -fixed / np.where(free, 1.0, per)
     only = np.where(only < 0, np.inf, only)
     # By rounding, two tyres may allow one and the same speed.
