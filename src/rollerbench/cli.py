@@ -5,11 +5,15 @@ import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Protocol
+from typing import TYPE_CHECKING, Annotated, Protocol
 
 import typer
 
 from rollerbench.errors import RollerbenchError, RollerbenchWarning, SimulationError
+
+if TYPE_CHECKING:
+    from rollerbench.analysis.limits import Capability
+    from rollerbench.report.limits import Measured
 
 app = typer.Typer(
     name="rollerbench",
@@ -147,17 +151,28 @@ def analyze(
     ground_friction: Annotated[
         float | None, typer.Option(help="Coefficient of friction of the ground.", show_default="the wheels' own")
     ] = None,
+    simulate: Annotated[
+        bool, typer.Option("--simulate", help="Lay what simulated robots do over the curves; takes some minutes.")
+    ] = False,
 ) -> None:
     """Show what a robot can do in each direction: speed, acceleration before a wheel slips, wheel efforts."""
     from rollerbench import studies
     from rollerbench.report.analysis import analysis_table
 
     with _progress(robot, 0.0, unit="steps") as show:
+
+        def measure(found: "Capability") -> "Measured":
+            from rollerbench.studies.measured_limits import measure_limits
+
+            label = f"{robot}: simulated directions"
+            return measure_limits(found, progress=lambda now, total: show(now, label=label, total=total))
+
         done = studies.analyze(
             robot,
             output=output,
             roll_resistance=roll_resistance,
             ground_friction=ground_friction,
+            measure=measure if simulate else None,
             progress=lambda now, total: show(now, total=total),
         )
     _print(analysis_table(done.capability))

@@ -3,7 +3,7 @@
 import math
 import multiprocessing
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from typing import Any
@@ -12,12 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.systems.analysis import Simulator
 
+from rollerbench.analysis.limits import Capability
 from rollerbench.description import Robot, load_robot
 from rollerbench.errors import SimulationError
 from rollerbench.kinematics import limits
 from rollerbench.kinematics.limits.loads import supporting_wheels
 from rollerbench.plant import follow_rollers
 from rollerbench.recording import Recording
+from rollerbench.report.limits import Measured, Points
 from rollerbench.simulation.drake_engine import simulate
 from rollerbench.simulation.scenario import Scenario, load_scenario
 from rollerbench.simulation.station import Station
@@ -54,28 +56,8 @@ STEADY_TIME = 0.8
 START_TIME = 0.8
 """Time of the smooth start in which efforts are measured [s]."""
 
-FRICTION = 0.8
-"""Coefficient of friction of the ground [-], a scenario's default."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class MeasuredLimits:
-    """What was found in simulation for each direction; NaN where the robot cannot move that way.
-
-    Attributes:
-        direction: Directions of travel (n,) [rad].
-        speed: Speeds (n,) with a wheel at its limit [m/s].
-        acceleration: Accelerations (n,) at which a wheel begins to slide or lifts off, under the efforts of
-            `limits.wheel_efforts`, whatever its motors can do [m/s2].
-        efforts: Efforts (n, n_driven) of the wheels' servos while the robot accelerates at effort_acceleration [N m].
-        effort_acceleration: That acceleration [m/s2].
-    """
-
-    direction: Array
-    speed: Array
-    acceleration: Array
-    efforts: Array
-    effort_acceleration: float
+DIRECTION_STEP_DEG = 10.0
+"""Step of the directions [deg]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,54 +65,56 @@ class _Task:
     robot: Robot
     direction: float
     roll_resistance: float
-    effort_acceleration: float
+    ground_friction: float | None
+    acceleration: float
 
 
 def measure_limits(
-    robot: Robot,
-    direction: Sequence[float] | Array,
-    *,
-    roll_resistance: float = 0.0,
-    effort_acceleration: float = 1.0,
-    progress: Callable[[int], None] | None = None,
-    workers: int | None = None,
-) -> MeasuredLimits:
-    """Simulates a robot in each direction, on all cores.
+    found: Capability, *, progress: Callable[[float, float], None] | None = None, workers: int | None = None
+) -> Measured:
+    """Simulates an analysed robot every 10 deg, or in the few directions that it can go, on all cores.
 
     Args:
-        robot: The robot.
-        direction: Directions of travel (n,) [rad].
-        roll_resistance: Rolling resistance over load [-].
-        effort_acceleration: Acceleration at which efforts are measured [m/s2].
-        progress: Called with the number of directions that are done.
+        found: What theory says.
+        progress: Called with the directions that are done and the directions there are.
         workers: Number of processes; by default one for each core.
+
+    Returns:
+        "speed": speeds with a wheel at its limit [m/s]; "acceleration": those at which a wheel begins to slide or lifts
+        off under the efforts of `limits.wheel_efforts`, whatever its motors can do [m/s2]; "efforts": those of the
+        wheels' servos at the reference acceleration of found [N m].
+
+    Raises:
+        SimulationError: a simulation failed.
     """
-    angles = np.asarray(direction, dtype=np.float64)
+    few = found.directions[found.goes & (found.directions < 2 * np.pi - 1e-9)]
+    directions = np.radians(np.arange(0.0, 360.0, DIRECTION_STEP_DEG)) if found.all_round else few
     tasks = [
         _Task(
-            robot=robot,
-            direction=float(angle),
-            roll_resistance=roll_resistance,
-            effort_acceleration=effort_acceleration,
+            robot=found.robot,
+            direction=float(direction),
+            roll_resistance=found.roll_resistance,
+            ground_friction=found.ground_friction,
+            acceleration=float(found.map_accelerations[found.reference]),
         )
-        for angle in angles
+        for direction in directions
     ]
+    if not tasks:
+        return {}
     rows: list[tuple[float, float, Array]] = []
-    count = min(len(tasks), workers or os.cpu_count() or 1)
     # Processes that start afresh: Drake's threads do not survive a fork.
+    count = min(len(tasks), workers or os.cpu_count() or 1)
     with ProcessPoolExecutor(count, mp_context=multiprocessing.get_context("spawn")) as pool:
         for row in pool.map(_measure, tasks):
             rows.append(row)
             if progress is not None:
-                progress(len(rows))
-    speed, acceleration, efforts = zip(*rows, strict=True)
-    return MeasuredLimits(
-        direction=angles,
-        speed=np.array(speed),
-        acceleration=np.array(acceleration),
-        efforts=np.array(efforts),
-        effort_acceleration=effort_acceleration,
-    )
+                progress(float(len(rows)), float(len(tasks)))
+    columns = zip(*rows, strict=True)
+    names = ("speed", "acceleration", "efforts")
+    return {
+        name: Points(directions=directions, values=np.array(column))
+        for name, column in zip(names, columns, strict=True)
+    }
 
 
 def _measure(task: _Task) -> tuple[float, float, Array]:
@@ -157,7 +141,11 @@ def _slip_onset(task: _Task) -> float:
     """Acceleration at which the efforts of inverse dynamics make a wheel slide or lift off, by bisection."""
     robot = _strong(task)
     limit = limits.max_acceleration(
-        robot, task.direction, sharing="least_norm", roll_resistance=task.roll_resistance, ground_friction=FRICTION
+        robot,
+        task.direction,
+        sharing="least_norm",
+        roll_resistance=task.roll_resistance,
+        ground_friction=_ground(task),
     )
     wanted = float(limit.value)
     if not math.isfinite(wanted) or wanted <= 0:
@@ -196,10 +184,10 @@ def _gives_way(task: _Task, robot: Robot, acceleration: float) -> bool:
 def _efforts(task: _Task) -> Array:
     """Mean efforts of the servos in the middle of a smooth start, where the acceleration is nearly even."""
     robot = _strong(task)
-    if not np.isfinite(_wheel_efforts(task, robot, task.effort_acceleration)).all():
+    if not np.isfinite(_wheel_efforts(task, robot, task.acceleration)).all():
         return np.full(len(robot.driven_wheels), np.nan)
     # A cubic step rises by 0.296 of its height in the middle fifth of its time.
-    command = _twist(task, task.effort_acceleration * START_TIME * 0.2 / 0.296, START_TIME)
+    command = _twist(task, task.acceleration * START_TIME * 0.2 / 0.296, START_TIME)
     recording = _recorded(_scenario(task, robot, 2 * START_TIME, command, time_step=EFFORT_STEP))
     middle = np.abs(recording.time / START_TIME - 0.5) < 0.1
     driven = [index for index, wheel in enumerate(robot.wheels) if wheel.driven]
@@ -214,12 +202,24 @@ def _wheel_efforts(task: _Task, robot: Robot, acceleration: float) -> Array:
 def _strong(task: _Task) -> Robot:
     """The robot with motors without limits, its swivelling wheels turned to the direction."""
     data = task.robot.model_dump(mode="json", exclude_none=True)
-    for wheel in data["wheels"]:
+    for wheel, friction in zip(data["wheels"], _friction(task), strict=True):
+        wheel["friction"] = friction * _ground(task) / (2 * _ground(task) - friction)
         for name in ("max_speed", "max_effort", "max_steering_speed", "max_steering_effort"):
             wheel.pop(name, None)
         if wheel["type"] in ("castor", "steered"):
             wheel["heading_deg"] = math.degrees(task.direction)
     return load_robot(data)
+
+
+def _friction(task: _Task) -> list[float]:
+    """Coefficients of friction between the wheels and the ground: a wheel's a and the ground's b make 2ab / (a + b)."""
+    own, ground = [wheel.friction for wheel in task.robot.wheels], task.ground_friction
+    return own if ground is None else [2 * a * ground / (a + ground) for a in own]
+
+
+def _ground(task: _Task) -> float:
+    """Friction of a ground that with wheels as those of `_strong` makes `_friction`."""
+    return max(_friction(task))
 
 
 def _twist(task: _Task, speed: float, ramp: float) -> dict[str, Any]:
@@ -237,7 +237,7 @@ def _scenario(
             "duration": duration,
             "command": command,
             "plant": {"time_step": time_step},
-            "ground": {"roll_resistance": task.roll_resistance, "friction": FRICTION},
+            "ground": {"roll_resistance": task.roll_resistance, "friction": _ground(task)},
         }
     )
 

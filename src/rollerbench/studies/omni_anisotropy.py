@@ -1,7 +1,7 @@
 """Leng and Cao (2007): speed, acceleration and efforts of four omni wheels by direction."""
 
 from rollerbench.description import OmniWheel, Robot, load_robot
-from rollerbench.description.mass import roller_inertia, spin_inertia
+from rollerbench.description.mass import axle_inertia, roller_inertia
 
 WEIGHT, WHEEL_INERTIA, ROLLER_INERTIA = 196.0, 3.669e-3, 5.235e-7
 """Weight [N], and rotational inertias of wheel and roller [kg m2], as printed."""
@@ -36,5 +36,5 @@ def _with_inertias(wheel: object) -> OmniWheel:
         update={"rollers": wheel.rollers.model_copy(update={"mass": float(mass)}), "friction": 1.0, "max_effort": None}
     )
     heavy = light.model_copy(update={"mass": light.mass + 1.0})
-    more = (WHEEL_INERTIA - spin_inertia(light)) / (spin_inertia(heavy) - spin_inertia(light))
+    more = (WHEEL_INERTIA - axle_inertia(light)) / (axle_inertia(heavy) - axle_inertia(light))
     return light.model_copy(update={"mass": light.mass + more})
