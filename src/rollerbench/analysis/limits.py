@@ -214,5 +214,5 @@ def _steps(largest: float) -> Array:
     rough = largest / 40
     unit = 10.0 ** math.floor(math.log10(rough))
     step = unit * next(factor for factor in (1, 2, 5, 10) if factor * unit >= rough)
-    steps: Array = step * np.arange(math.floor(largest / step * (1 + 1e-9)) + 1)
+    steps: Array = step * np.arange(math.floor(largest / step * (1 + 1e-9)) + 1, dtype=np.float64)
     return steps
