@@ -22,7 +22,7 @@ def rollerbench(*arguments: str, cwd: Path | None = None) -> subprocess.Complete
 def test_help_has_an_example_for_every_command() -> None:
     top = rollerbench("--help")
     assert top.returncode == 0
-    for command in ("robots", "scenarios", "run", "build", "schema"):
+    for command in ("robots", "scenarios", "run", "analyze", "build", "schema"):
         assert command in top.stdout
         shown = rollerbench(command, "--help")
         assert shown.returncode == 0
@@ -64,6 +64,8 @@ def test_run_prints_a_table_and_writes_the_folder(tmp_path: Path) -> None:
         (["robots", "a" * 300], "no robot 'aaa"),
         (["run", "youbot_plus_x", "--set", "seed=2024-13-45"], "--set 'seed=2024-13-45'"),
         (["build", "no_such"], "no robot 'no_such'"),
+        (["analyze", "no_such"], "no robot 'no_such'"),
+        (["analyze", "kiwi", "-o", "/dev/null/kiwi"], "/dev/null/kiwi"),
         (["fly"], "No such command 'fly'"),
         (["run", "youbot_plus_x", "-o", "/dev/null/run"], "/dev/null/run"),
     ],
@@ -74,6 +76,19 @@ def test_bad_input_ends_with_one_message_and_status_2(arguments: list[str], word
     assert words in done.stderr
     assert "Traceback" not in done.stderr
     assert list(tmp_path.iterdir()) == []
+
+
+def test_analyze_prints_a_table_and_writes_the_folder(tmp_path: Path) -> None:
+    done = rollerbench("analyze", "kiwi", cwd=tmp_path)
+    assert done.returncode == 0
+    assert done.stderr == ""
+    assert "1.386 m/s at 0 deg, 1.2 m/s at 30 deg" in done.stdout
+    assert {path.name for path in (tmp_path / "analyses" / "kiwi").iterdir()} == {
+        *("analysis.json", "figures", "report.html"),
+    }
+    bad = rollerbench("analyze", "kiwi", "--roll-resistance", "-1", cwd=tmp_path)
+    assert bad.returncode == 2
+    assert "roll_resistance = -1.0: accepted: a number of 0 or more" in bad.stderr
 
 
 def test_an_infeasible_command_is_bad_input(tmp_path: Path) -> None:

@@ -160,6 +160,7 @@ def test_a_cart_has_a_segment() -> None:
     limit = rb.limits.max_speed(CART, np.radians([0, 90, 180]))
     assert limit.value == pytest.approx([0.9, np.nan, 0.9], nan_ok=True)
     assert limit.cause.tolist() == ["speed", "tyres", "speed"]
+    assert limit.wheels(0) == ("right",)
     assert limit.wheels(1) == ("left", "right")
     with pytest.raises(rb.KinematicsError, match=r"tyres would skid sideways \(left, right\)"):
         float(rb.limits.max_speed(CART, math.pi / 2))

@@ -173,14 +173,14 @@ def travel_directions(robot: Robot) -> Array:
             for angle in (ahead % (2 * math.pi), (ahead + math.pi) % (2 * math.pi)):
                 if np.abs(directions - angle).min() > 1e-9:
                     directions = np.append(directions, angle)
-    return np.asarray(np.sort(directions), dtype=np.float64)
+    sorted_directions: Array = np.sort(directions)
+    return sorted_directions
 
 
 def sectors(directions: Array, limit: Limit) -> Iterator[tuple[float, float, str, tuple[str, ...]]]:
     """Ranges of directions with the same cause and wheels: start and end [rad], cause, names of the wheels.
 
-    A single direction between two equal ranges, or at the border of two, where both limit, is no range of its own;
-    a single direction that alone has a limit is.
+    A single direction at the border of ranges that have limits too ends these, and is no range of its own.
     """
     keys = [(str(cause), limit.wheels(i)) for i, cause in enumerate(limit.cause)]
     runs: list[list[int]] = []
@@ -189,15 +189,18 @@ def sectors(directions: Array, limit: Limit) -> Iterator[tuple[float, float, str
             runs[-1][1] = i
         else:
             runs.append([i, i])
-    kept = [run for run in runs if run[0] != run[1] or not _between(limit, *run)]
-    for first, last in kept:
-        yield float(directions[first]), float(directions[last]), *keys[first]
+    borders = {run[0] for run in runs if run[0] == run[1] and _between(limit, run[0])}
+    for first, last in runs:
+        if first not in borders:
+            start, end = max(first - 1, 0), min(last + 1, len(keys) - 1)
+            ends = start if start in borders else first, end if end in borders else last
+            yield float(directions[ends[0]]), float(directions[ends[1]]), *keys[first]
 
 
-def _between(limit: Limit, first: int, last: int) -> bool:
-    """Whether a range is a border between ranges that have limits too."""
-    around = [i for i in (first - 1, last + 1) if 0 <= i < len(limit.value)]
-    return bool(limit.feasible[around].all())
+def _between(limit: Limit, index: int) -> bool:
+    """Whether the directions next to one have limits as it has."""
+    around = [i for i in (index - 1, index, index + 1) if 0 <= i < len(limit.value)]
+    return bool(limit.feasible[around].all()) and len(around) > 1
 
 
 def _polygon(robot: Robot) -> SpeedPolygon | None:
@@ -214,5 +217,4 @@ def _steps(largest: float) -> Array:
     rough = largest / 40
     unit = 10.0 ** math.floor(math.log10(rough))
     step = unit * next(factor for factor in (1, 2, 5, 10) if factor * unit >= rough)
-    steps: Array = step * np.arange(math.floor(largest / step * (1 + 1e-9)) + 1, dtype=np.float64)
-    return steps
+    return step * np.arange(math.floor(largest / step * (1 + 1e-9)) + 1, dtype=np.float64)

@@ -126,10 +126,12 @@ def _extremes(found: Capability, limit: Limit, unit: str) -> str:
     # Of equal values, the direction closest to forward.
     at_most = degrees[np.flatnonzero(limit.value >= most * (1 - 1e-6))[0]]
     at_least = degrees[np.flatnonzero(limit.value <= least * (1 + 1e-6))[0]]
-    few = "" if found.all_round else "; at " + ", ".join(f"{x:.4g}" for x in degrees[limit.feasible][:4]) + " deg alone"
-    if most - least <= 1e-4 * most:
-        return f"{most:.4g} {unit} in {'every direction' if found.all_round else 'all that it can go'}{few}"
-    return f"{most:.4g} {unit} at {at_most:.4g} deg, {least:.4g} {unit} at {at_least:.4g} deg{few}"
+    if most - least <= 1e-4 * most and found.all_round:
+        return f"{most:.4g} {unit} in every direction"
+    if found.few:
+        ways = np.flatnonzero(limit.feasible & (degrees < 360.0 - 1e-6))
+        return ", ".join(f"{limit.value[i]:.4g} {unit} at {degrees[i]:.4g} deg" for i in ways) + "; no other way"
+    return f"{most:.4g} {unit} at {at_most:.4g} deg, {least:.4g} {unit} at {at_least:.4g} deg"
 
 
 def _assumptions(found: Capability) -> str:
@@ -138,6 +140,8 @@ def _assumptions(found: Capability) -> str:
         "each wheel's coefficient" if friction is None else f"the wheels' coefficients and {friction:g} of the ground"
     )
     parts = [f"Friction has {ground}; rolling resistance is {found.roll_resistance:g} of the load."]
+    if found.roll_resistance and any(wheel.ring for wheel in found.robot.wheels):
+        parts.append("In the single directions in which a wheel or its roller stands still, it resists neither way.")
     if any(wheel.steered for wheel in found.robot.wheels):
         parts.append("Steered wheels are steered to the direction.")
     if any(wheel.swivel_offset for wheel in found.robot.wheels):
@@ -154,6 +158,8 @@ def _columns(unit: str) -> tuple[str, ...]:
 def _lines(found: Capability, limit: Limit) -> list[tuple[str, ...]]:
     lines: list[tuple[str, ...]] = []
     for first, last, cause, wheels in sectors(found.directions, limit):
+        if cause == "tyres" or (found.few and first > 2 * math.pi - 1e-9):
+            continue
         inside = (found.directions >= first) & (found.directions <= last)
         values = limit.value[inside]
         least, most = ("-", "-") if np.isnan(values).all() else (f"{values.min():.4g}", f"{values.max():.4g}")

@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.projections.polar import PolarAxes
+from mpl_toolkits.mplot3d import Axes3D
 from numpy.typing import NDArray
 
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#F0E442")
@@ -81,6 +82,33 @@ def new_polar_figure() -> tuple[Figure, PolarAxes]:
     axes.grid(visible=True, color="0.88")
     axes.set_axisbelow(True)
     return figure, axes
+
+
+def surface(
+    labels: tuple[str, str, str], x: NDArray[np.float64], y: NDArray[np.float64], z: NDArray[np.float64]
+) -> str:
+    """SVG text of a surface z (n, m) over x (n,) and y (m,); parts without a value are left out.
+
+    Args:
+        labels: Labels of the three axes.
+        x: First abscissae (n,).
+        y: Second abscissae (m,).
+        z: Heights (n, m).
+    """
+    figure = Figure(figsize=(7.0, 5.2), layout="constrained")
+    axes = cast(Axes3D, figure.add_subplot(projection="3d"))
+    grid = np.meshgrid(x, y, indexing="ij")
+    known = z[np.isfinite(z)]
+    axes.plot_surface(
+        *grid, z, cmap="viridis", vmin=known.min(), vmax=known.max(), rcount=60, ccount=40, linewidth=0.1,
+        edgecolor="white",
+    )  # fmt: skip
+    axes.set_xlabel(labels[0])
+    axes.set_ylabel(labels[1])
+    axes.set_zlabel(labels[2])
+    axes.view_init(elev=28.0, azim=-125.0)
+    axes.set_box_aspect(None, zoom=0.88)
+    return svg_text(figure)
 
 
 def svg_text(figure: Figure) -> str:

@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.projections.polar import PolarAxes
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from rollerbench.analysis.limits import Capability
@@ -52,6 +53,7 @@ def limit_figures(found: Capability, measured: Measured | None = None) -> dict[s
         figures["speed_and_yaw"] = speed_and_yaw(found)
     if found.accelerations["best"].feasible.any():
         figures["acceleration"] = acceleration(found, points.get("acceleration"))
+    if not found.few and any(limit.feasible.any() for limit in (found.speed, found.accelerations["best"])):
         figures["limiting_wheels"] = limiting_wheels(found)
     if np.isfinite(found.efforts).any():
         figures["efforts"] = efforts(found, points.get("efforts"))
@@ -63,9 +65,9 @@ def limit_figures(found: Capability, measured: Measured | None = None) -> dict[s
 def speed(found: Capability, points: Points | None = None) -> str:
     """Largest speed over the direction, at some yaw rates."""
     figure, axes = new_polar_figure()
-    for row, (yaw_rate, style) in enumerate(zip(found.yaw_rates, STYLES, strict=False)):
+    for row, yaw_rate in enumerate(found.yaw_rates):
         label = f"turning at {yaw_rate:.3g} rad/s" if row else "without turning"
-        _rays_or_curve(axes, found, found.speeds.value[row], style, COLORS[row], label, shift=row)
+        _rays_or_curve(axes, found, found.speeds.value[row], row, label)
     _lay_over(axes, points)
     return _finish_polar(figure, axes, "largest speed [m/s]")
 
@@ -73,8 +75,8 @@ def speed(found: Capability, points: Points | None = None) -> str:
 def acceleration(found: Capability, points: Points | None = None) -> str:
     """Largest acceleration over the direction, for ways to share the push."""
     figure, axes = new_polar_figure()
-    for row, ((name, limit), style) in enumerate(zip(found.accelerations.items(), STYLES, strict=False)):
-        _rays_or_curve(axes, found, limit.value, style, COLORS[row], VARIANT_LABELS[name], shift=row)
+    for row, (name, limit) in enumerate(found.accelerations.items()):
+        _rays_or_curve(axes, found, limit.value, row, VARIANT_LABELS[name])
     _lay_over(axes, points)
     return _finish_polar(figure, axes, "largest acceleration [m/s²]")
 
@@ -108,7 +110,7 @@ def limiting_wheels(found: Capability) -> str:
         _bands(axes, found, limit)
         axes.set_yticks(range(len(wheels)), wheels)
         axes.set_ylim(len(wheels) - 0.5, -0.5)
-        axes.set_xlim(-3.0 if found.few else 0.0, 363.0 if found.few else 360.0)
+        axes.set_xlim(0.0, 360.0)
         axes.set_xticks(range(0, 361, 30))
         axes.set_title(label, loc="left", fontsize="medium")
         axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
@@ -184,26 +186,22 @@ def _efforts_of_few(found: Capability, points: Points | None) -> str:
     return svg_text(figure)
 
 
-def _rays_or_curve(
-    axes: PolarAxes, found: Capability, values: Array, style: str, color: str, label: str, shift: int
-) -> None:
-    """A closed curve, or rays where the base can go in few directions; those of several curves lie side by side."""
+def _rays_or_curve(axes: PolarAxes, found: Capability, values: Array, row: int, label: str) -> None:
+    """A closed curve, or rays where the base can go in few directions, the later ones thinner."""
+    color, style = COLORS[row], STYLES[row]
     if not found.few:
         axes.plot(found.directions, values, style, color=color, label=label, linewidth=1.5)
         return
-    shown = np.flatnonzero(np.isfinite(values) & (found.directions < 2 * np.pi - 1e-9))
-    for position, index in enumerate(shown):
-        angle = found.directions[index] + np.radians(2.5) * shift
+    for position, index in enumerate(np.flatnonzero(np.isfinite(values) & (found.directions < 2 * np.pi - 1e-9))):
         axes.plot(
-            [angle, angle],
+            np.full(2, found.directions[index]),
             [0.0, values[index]],
-            "-",
             marker="o",
             markevery=[1],
-            markersize=5,
+            markersize=(9, 6, 3)[row],
             color=color,
-            label=label if position == 0 else None,
-            linewidth=2.0,
+            label=None if position else label,
+            linewidth=(5.0, 3.0, 1.2)[row],
         )
 
 
@@ -213,7 +211,8 @@ def _lay_over(axes: PolarAxes, points: Points | None) -> None:
 
 
 def _finish_polar(figure: Figure, axes: PolarAxes, title: str) -> str:
-    axes.set_ylim(bottom=0.0)
+    axes.set_ylim(0.0, 1.08 * max(float(np.nanmax(line.get_ydata())) for line in axes.lines))
+    axes.yaxis.set_major_locator(MaxNLocator(5))
     axes.set_title(title + "; 0 deg is forward, 90 deg left", fontsize="medium")
     figure.legend(loc="outside lower center", ncols=2, fontsize="small")
     return svg_text(figure)
@@ -221,18 +220,13 @@ def _finish_polar(figure: Figure, axes: PolarAxes, title: str) -> str:
 
 def _bands(axes: Axes, found: Capability, limit: Limit) -> None:
     degrees = np.degrees(found.directions)
-    if found.few:
-        # Wide enough to be seen.
-        left, right = degrees - 3.0, degrees + 3.0
-    else:
-        middle = 0.5 * (degrees[1:] + degrees[:-1])
-        left, right = np.concatenate([degrees[:1], middle]), np.concatenate([middle, degrees[-1:]])
+    half = 0.5 * np.gradient(degrees)
     for cause, color in CAUSE_COLORS.items():
         here = limit.feasible & (limit.cause == cause)
         for wheel in range(len(found.robot.wheels)):
-            at = here & limit.at_limit[:, wheel]
-            axes.broken_barh(
-                list(zip(left[at], (right - left)[at], strict=True)), (wheel - 0.35, 0.7), color=color, linewidth=0.0
-            )
+            edges = np.diff(np.concatenate([[0], (here & limit.at_limit[:, wheel]).astype(int), [0]]))
+            first, last = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
+            left, right = degrees[first] - half[first], degrees[last] + half[last]
+            axes.broken_barh(list(zip(left, right - left, strict=True)), (wheel - 0.35, 0.7), color=color, linewidth=0)
         if here.any():
             axes.plot([], [], "s", color=color, label=cause)

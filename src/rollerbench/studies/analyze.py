@@ -45,7 +45,7 @@ def analyze(
     output: str | Path | None = None,
     roll_resistance: float = 0.0,
     ground_friction: float | None = None,
-    measure: Callable[[Capability], Measured] | None = None,
+    measure: Callable[[Capability, Progress], Measured] | None = None,
     progress: Progress | None = None,
 ) -> Analysis:
     """Largest speeds and accelerations, efforts and isotropy of a robot.
@@ -55,7 +55,8 @@ def analyze(
         output: Folder to write: figures/*.svg, analysis.json, report.html; by default analyses/NAME.
         roll_resistance: Resisting force of a rolling wheel or roller over its load [-].
         ground_friction: Coefficient of friction of the ground; None for each wheel's own.
-        measure: Finds points to lay over the curves, by simulation for example; called with what theory says.
+        measure: Finds points to lay over the curves, by simulation for example; called with what theory says and with
+            progress.
         progress: Called now and then.
 
     Raises:
@@ -67,8 +68,14 @@ def analyze(
     earlier = claim(
         folder, files={"analysis.json", "report.html"}, folders={"figures"}, index="analysis.json", what="analysis"
     )
-    found = capability(loaded, roll_resistance=roll_resistance, ground_friction=ground_friction, progress=progress)
-    measured = {} if measure is None else measure(found)
+    show = progress or (lambda done, total: None)
+    found = capability(
+        loaded,
+        roll_resistance=roll_resistance,
+        ground_friction=ground_friction,
+        progress=lambda done, total: show(done, total + 1.0),
+    )
+    measured = {} if measure is None else measure(found, show)
     figures = limit_figures(found, measured)
     # The page of an earlier analysis does not belong to the figures that are about to replace its figures.
     for name in ("report.html", "analysis.json"):

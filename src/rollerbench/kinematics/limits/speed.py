@@ -147,7 +147,9 @@ def _largest(robot: Robot, shape: tuple[int, ...], per_s: Array, yaw_rate: Array
     tyres_alone = (at & is_tyre).any(axis=1) & (np.isinf(need) | ~(at & ~is_tyre).any(axis=1))
     cause = np.where(tyres_alone, "tyres", np.where(np.isinf(value) & allowed, "unlimited", "speed"))
     at_limit = np.zeros((len(per_s), len(robot.wheels)), dtype=bool)
-    at_limit[:, np.concatenate([rows.driven, rows.steered, rows.tyres])] = at
+    columns = np.concatenate([rows.driven, rows.steered, rows.tyres])
+    for wheel in range(len(robot.wheels)):
+        at_limit[:, wheel] = at[:, columns == wheel].any(axis=1)
     return Limit(
         value=np.where(allowed & np.isfinite(value), value, np.nan).reshape(shape),
         cause=cause.reshape(shape),
