@@ -47,9 +47,7 @@ def main() -> None:
         found = simulated_speed(robot, ahead)
         print(f"{azimuth_deg:4.0f} deg {ahead:13.2f} {aside:9.2f} {found:14.2f}", end=" ")
         print(f"{push_ahead:15.2f} {push_aside:9.2f} {turn:22.2f}")
-    print(
-        "\nWheels close to the axis of travel turn slowly there, so the base is fast ahead: 1 / sin(azimuth). For the same"
-    )
+    print("\nClose to the axis of travel wheels turn slowly, so the base is fast ahead: 1 / sin(azimuth). For the same")
     print(
         "reason they push weakly: what the base gains in speed it loses in traction. Aside it is the other way round."
     )

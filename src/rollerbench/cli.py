@@ -5,15 +5,11 @@ import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Protocol
+from typing import Annotated, Protocol
 
 import typer
 
 from rollerbench.errors import RollerbenchError, RollerbenchWarning, SimulationError
-
-if TYPE_CHECKING:
-    from rollerbench.analysis.limits import Capability
-    from rollerbench.report.limits import Measured
 
 app = typer.Typer(
     name="rollerbench",
@@ -159,20 +155,15 @@ def analyze(
     from rollerbench import studies
     from rollerbench.report.analysis import analysis_table
 
+    if simulate:
+        from rollerbench.studies.measured_limits import measure_limits
     with _progress(robot, 0.0, unit="steps") as show:
-
-        def measure(found: "Capability") -> "Measured":
-            from rollerbench.studies.measured_limits import measure_limits
-
-            label = f"{robot}: simulated directions"
-            return measure_limits(found, progress=lambda now, total: show(now, label=label, total=total))
-
         done = studies.analyze(
             robot,
             output=output,
             roll_resistance=roll_resistance,
             ground_friction=ground_friction,
-            measure=measure if simulate else None,
+            measure=measure_limits if simulate else None,
             progress=lambda now, total: show(now, total=total),
         )
     _print(analysis_table(done.capability))

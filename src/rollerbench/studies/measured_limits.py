@@ -70,7 +70,7 @@ class _Task:
 
 
 def measure_limits(
-    found: Capability, *, progress: Callable[[float, float], None] | None = None, workers: int | None = None
+    found: Capability, progress: Callable[[float, float], None] | None = None, *, workers: int | None = None
 ) -> Measured:
     """Simulates an analysed robot every 10 deg, or in the few directions that it can go, on all cores.
 
