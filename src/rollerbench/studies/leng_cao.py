@@ -1,8 +1,8 @@
 """Leng and Cao's formulas as printed, and with their mistakes mended; wheels i at azimuths gamma_i, delta = 2 alpha.
 
 The loads are P/4 each, beta is the direction of travel, and by symmetry wheels 1 and 3 do the same, as do 2 and 4. The
-paper prints the formulas for 0 <= beta < alpha, where wheels 2 and 4 push hardest, and says that others follow likewise;
-mended, they hold up to 90 deg.
+paper prints the formulas for 0 <= beta < alpha, where wheels 2 and 4 push hardest, and says that others follow
+likewise; mended, they hold up to 90 deg.
 """
 
 from dataclasses import dataclass
