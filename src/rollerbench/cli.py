@@ -147,17 +147,23 @@ def analyze(
     ground_friction: Annotated[
         float | None, typer.Option(help="Coefficient of friction of the ground.", show_default="the wheels' own")
     ] = None,
+    simulate: Annotated[
+        bool, typer.Option("--simulate", help="Lay what simulated robots do over the curves; takes some minutes.")
+    ] = False,
 ) -> None:
     """Show what a robot can do in each direction: speed, acceleration before a wheel slips, wheel efforts."""
     from rollerbench import studies
     from rollerbench.report.analysis import analysis_table
 
+    if simulate:
+        from rollerbench.studies.measured_limits import measure_limits
     with _progress(robot, 0.0, unit="steps") as show:
         done = studies.analyze(
             robot,
             output=output,
             roll_resistance=roll_resistance,
             ground_friction=ground_friction,
+            measure=measure_limits if simulate else None,
             progress=lambda now, total: show(now, total=total),
         )
     _print(analysis_table(done.capability))

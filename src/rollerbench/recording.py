@@ -46,7 +46,8 @@ WHEEL_COLUMNS: dict[str, str] = {
 }
 """Columns of each wheel, named wheel.column, and their units.
 
-speed is the wheel's own, measured what its encoder tells; measured, command and effort are NaN for wheels without a
+speed is the wheel's own, measured what its encoder tells; command is the commanded speed, or where torques are
+commanded the one that these should lead to; measured, command and effort are NaN for wheels without a
 motor. contact_x and contact_y are where the wheel touches the ground, from Bo along the axes of B turned upright;
 slip_x and slip_y are the velocity of the wheel's or roller's surface over the ground along them; depth is the
 penetration, negative in the air. With the velocity v_C of the body over the contact, drive = (drive_x, drive_y) along

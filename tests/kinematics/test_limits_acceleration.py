@@ -13,7 +13,7 @@ from scipy.optimize import linprog
 import robots
 import rollerbench as rb
 from rollerbench.description.inertia import GRAVITY
-from rollerbench.description.mass import roller_inertia, spin_inertia
+from rollerbench.description.mass import axle_inertia, roller_inertia
 from rollerbench.kinematics.limits.cone_program import Cones, maximize, slack
 from rollerbench.studies.omni_anisotropy import paper_robot
 
@@ -87,7 +87,7 @@ def test_symmetries_of_leng_and_cao(beta: float) -> None:
 def test_the_paper_robot_has_the_printed_inertias() -> None:
     wheel = PAPER.wheels[0]
     assert PAPER.mass * 9.8 == pytest.approx(196.0)
-    assert spin_inertia(wheel) == pytest.approx(3.669e-3, rel=1e-9)
+    assert axle_inertia(wheel) == pytest.approx(3.669e-3, rel=1e-9)
     assert roller_inertia(wheel).moment[0, 0] == pytest.approx(5.235e-7, rel=1e-9)
 
 
@@ -156,7 +156,7 @@ def test_efforts_make_the_acceleration(name: str, direction: float, acceleration
     driven = np.array([wheel.driven for wheel in robot.wheels])
     radius = np.array([wheel.radius for wheel in robot.wheels])
     rings = [i for i, wheel in enumerate(robot.wheels) if wheel.ring]
-    spin = np.array([spin_inertia(wheel) for wheel in robot.wheels])
+    spin = np.array([axle_inertia(wheel) for wheel in robot.wheels])
     roller = [float(roller_inertia(robot.wheels[i]).moment[0, 0] / robot.wheels[i].rollers.radius ** 2) for i in rings]
     rest, com = robot.inertia, _mass_centre(robot, u)
     moved = np.array([[1, 0, -com[1]], [0, 1, com[0]], [0, 0, 1]])
@@ -219,7 +219,7 @@ def test_loads_are_in_equilibrium(name: str, direction: float, acceleration: flo
     height = robot.inertia.com[2] - robot.ground_height
     shift = loads @ places + robot.mass * height * acceleration * u
     # What is left spins up wheels and rollers: at most as if all of them turned about one axis.
-    spin = sum(spin_inertia(w) * 4 * acceleration / w.radius for w in robot.wheels)
+    spin = sum(axle_inertia(w) * 4 * acceleration / w.radius for w in robot.wheels)
     assert np.linalg.norm(shift) <= spin + 1e-9
     rest = rb.limits.wheel_loads(robot, direction, 0.0)
     assert rest @ places == pytest.approx([0, 0], abs=1e-9)
@@ -231,7 +231,7 @@ def test_loads_of_three_wheels_by_hand() -> None:
     front = rb.limits.wheel_loads(robot, 0.0, 1.0)[0]
     height = robot.inertia.com[2] + 0.06
     # Wheels at 120 and 240 deg turn at cos(30 deg) / R; their axles are 30 deg off the pitch axis.
-    spin = 2 * spin_inertia(robot.wheels[1]) * math.cos(math.radians(30)) ** 2 / 0.06
+    spin = 2 * axle_inertia(robot.wheels[1]) * math.cos(math.radians(30)) ** 2 / 0.06
     roller = roller_inertia(robot.wheels[0]).moment[0, 0] / 0.008 * (1 + 2 * 0.25)
     expected = robot.mass * GRAVITY / 3 - (robot.mass * height + spin + roller) / 0.3
     assert front == pytest.approx(expected, rel=1e-9)

@@ -1,5 +1,7 @@
 """How the mass of a robot's parts is spread."""
 
+from collections.abc import Iterable
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
@@ -9,6 +11,7 @@ from rollerbench.description.inertia import (
     RigidInertia,
     at_origin,
     barrel_volume,
+    combined,
     solid_barrel,
     solid_box,
     solid_cylinder,
@@ -59,20 +62,28 @@ def hub_inertia(wheel: Wheel) -> RigidInertia:
     return solid_cylinder(mass, hub_radius(wheel), wheel.width)
 
 
+def hub_with_rollers(wheel: Wheel, rollers: Iterable[int]) -> RigidInertia:
+    """Mass distribution in H of the hub with some of its rollers, by index.
+
+    Rollers turn freely about their axes u, so they resist no turn about it: I_roller - I_axial u u^T.
+    """
+    if not isinstance(wheel, RollerWheel):
+        return hub_inertia(wheel)
+    roller, poses = roller_inertia(wheel), roller_poses_H(wheel)
+    across = roller.moment - np.diag([roller.moment[0, 0], 0.0, 0.0])
+    free = RigidInertia(mass=roller.mass, com=roller.com, moment=across)
+    return combined([hub_inertia(wheel), *(free.moved(*poses[index]) for index in rollers)])
+
+
+def axle_inertia(wheel: Wheel) -> float:
+    """Rotational inertia of a wheel about its axle, with rollers that turn freely [kg m2]."""
+    count = wheel.rollers.count if isinstance(wheel, RollerWheel) else 0
+    return float(hub_with_rollers(wheel, range(count)).moment[1, 1])
+
+
 def roller_poses_H(wheel: RollerWheel) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
     """Rotation (3, 3) and centre (3,) [m] of each roller in H; the roller's x axis is its axis of rotation."""
     ring = wheel.ring
     bottom = Rotation.from_euler("z", ring.roller_angle + 0.5 * np.pi)
     rotations = Rotation.from_rotvec(ring.angles[:, np.newaxis] * [0.0, 1.0, 0.0]) * bottom
     return list(zip(rotations.as_matrix(), ring.centers_H, strict=True))
-
-
-def spin_inertia(wheel: Wheel) -> float:
-    """Rotational inertia of a wheel about its axle, rollers included [kg m2]."""
-    moment = hub_inertia(wheel).moment[1, 1]
-    if isinstance(wheel, RollerWheel):
-        roller = roller_inertia(wheel)
-        for rotation, center in roller_poses_H(wheel):
-            own = rotation @ roller.moment @ rotation.T
-            moment += own[1, 1] + roller.mass * (center[0] ** 2 + center[2] ** 2)
-    return float(moment)

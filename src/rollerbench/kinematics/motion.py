@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
+from rollerbench.kinematics.dynamics import RollingDynamics
 from rollerbench.kinematics.profile import Profile
 from rollerbench.kinematics.wheels import WheelKinematics
 
@@ -26,6 +27,7 @@ class Motion:
         steering_angles: Angles of the steered wheels over time [rad]; no columns if there are none.
         kinematics: The equations at the steering angles of the start.
         steers: Whether the steering angles change on the way.
+        wheel_efforts: Torques of the driven wheels over time [N m], where these are commanded.
     """
 
     twist: Profile
@@ -33,6 +35,7 @@ class Motion:
     steering_angles: Profile
     kinematics: WheelKinematics
     steers: bool
+    wheel_efforts: Profile | None = None
 
 
 def wheel_motion(kinematics: WheelKinematics, wheel_speeds: Profile) -> Motion:
@@ -47,6 +50,20 @@ def wheel_motion(kinematics: WheelKinematics, wheel_speeds: Profile) -> Motion:
         steering_angles=_constant(np.zeros(len(kinematics.robot.steered_wheels))),
         kinematics=kinematics,
         steers=False,
+    )
+
+
+def effort_motion(dynamics: RollingDynamics, wheel_efforts: Profile, duration: float, time_step: float) -> Motion:
+    """The motion that commanded torques lead to from rest; steered wheels stay at their heading."""
+    twist = dynamics.twist(wheel_efforts, duration, time_step)
+    kinematics = dynamics.kinematics
+    return Motion(
+        twist=twist,
+        wheel_speeds=twist.mapped(kinematics.drive_matrix),
+        steering_angles=_constant(np.zeros(len(kinematics.robot.steered_wheels))),
+        kinematics=kinematics,
+        steers=False,
+        wheel_efforts=wheel_efforts,
     )
 
 

@@ -90,6 +90,14 @@ class WheelKinematics:
         return self._rows[1][self._tyre_indices]
 
     @cached_property
+    def rolling_matrix(self) -> Array:
+        """Surface speeds R q' (n_wheels, 3) of all wheels, driven or not: R q' = rolling_matrix @ v_xyw_B [m/s]."""
+        along, left = self._rows
+        slopes = np.array([[wheel.roller_slope] for wheel in self.robot.wheels])
+        matrix: Array = along + slopes * left
+        return matrix
+
+    @cached_property
     def roller_matrix(self) -> Array:
         """G (k, 3): surface speeds of the touching rollers [m/s] = G @ v_xyw_B, one row for each wheel with rollers.
 

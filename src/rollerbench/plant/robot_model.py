@@ -93,6 +93,14 @@ class RobotModel:
             matrix[len(actuators) + row[names.swivel_joint(wheel.name)], rate] = 1.0
         return matrix
 
+    def actuation_matrix(self) -> NDArray[np.float64]:
+        """Matrix (n_actuators, n_driven) from wheel efforts [N m] to the plant's actuation port of the model."""
+        row = {actuator.joint().name(): index for index, actuator in enumerate(self.actuators)}
+        matrix = np.zeros((len(row), len(self.robot.driven_wheels)))
+        for column, wheel in enumerate(self.robot.driven_wheels):
+            matrix[row[names.drive_joint(wheel.name)], column] = 1.0
+        return matrix
+
     def wheel_speed_matrix(self) -> NDArray[np.float64]:
         """Matrix (n_driven, nq + nv) from the robot's state [q; v] to the speeds of its driven wheels."""
         plant, instance = self.plant, self.model_instance
@@ -181,7 +189,8 @@ def add_robot(
     Args:
         plant: The plant.
         robot: Robot, name of a shipped one, or path to a robot.yaml.
-        gains: Gains of the servos; by default those of `servo_gains(robot)`.
+        gains: Gains of the servos; by default those of `servo_gains(robot)`. A driven wheel that is missing in
+            `drive_damping` has no servo: its torque comes from the plant's actuation port.
         roller_model: Which rollers are simulated.
         builder: The builder of the plant's diagram; needed for windowed rollers, for the system that remembers them.
         window_size: Number of simulated rollers a wheel, from 2; wheels with as many or fewer are simulated in full.
@@ -206,6 +215,8 @@ def add_robot(
     plant.SetDefaultFloatingBaseBodyPose(model.body, standing)
     gains = gains or servo_gains(robot)
     for wheel in robot.driven_wheels:
+        if wheel.name not in gains.drive_damping:
+            continue
         actuator = plant.GetJointActuatorByName(names.drive_joint(wheel.name), instance)
         actuator.set_controller_gains(PdControllerGains(p=0.0, d=gains.drive_damping[wheel.name]))
     for wheel in robot.steered_wheels:

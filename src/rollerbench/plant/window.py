@@ -13,7 +13,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import BasicVector, Context, Diagram, DiscreteValues, EventStatus, LeafSystem, System
 
 from rollerbench.description.inertia import RigidInertia
-from rollerbench.description.mass import roller_poses_H
+from rollerbench.description.mass import axle_inertia, roller_poses_H
 from rollerbench.errors import SimulationError
 from rollerbench.sdf.window import HYSTERESIS, Window
 
@@ -91,32 +91,30 @@ class RollerWindow(LeafSystem):
 
     def follower(self) -> Callable[[Context], None]:
         """A function that follows the wheels in a root context, to call after each step."""
-        plant, half_period = self._plant, 0.5 * self._period
+        plant = self._plant
         wheels = [_Follower(wheel, offset) for wheel, offset in zip(self._wheels, self.offsets.values(), strict=True)]
-        starts, seen = -1, -math.inf
+        starts, steps = -1, 0
 
         def follow(root: Context) -> None:
             # Called after every step: what happens seldom is behind the return.
-            nonlocal starts, seen
+            nonlocal starts, steps
             context = plant.GetMyMutableContextFromRoot(root)
-            angle, now = plant.GetPositions(context).item, root.get_time()
+            angle = plant.GetPositions(context).item
             started = starts != self._starts
-            for wheel in wheels:
-                if abs(angle(wheel.position) * wheel.per_pitch + wheel.middle) > FARTHEST:
-                    break
-            else:
-                if now - seen < half_period and not started:
-                    return
+            behind = [w for w in wheels if abs(angle(w.position) * w.per_pitch + w.middle) > FARTHEST]
+            steps += 1
+            if not (behind or started or steps >= CHECK_STEPS // 2):
+                return
+            now, velocities = root.get_time(), plant.GetVelocities(context)
             state = self.GetMyMutableContextFromRoot(root).get_mutable_discrete_state_vector()
-            velocities = plant.GetVelocities(context)
-            for wheel in wheels:
+            for wheel in wheels if started else behind:
                 wheel.restore(context, state, everything=started)
-                behind = abs(angle(wheel.position) * wheel.per_pitch + wheel.middle)
-                if behind > FARTHEST:
-                    if behind > wheel.within and not started:
+                away = abs(angle(wheel.position) * wheel.per_pitch + wheel.middle)
+                if away > FARTHEST:
+                    if away > wheel.within and not started:
                         self._report_leap(wheel, now)
                     wheel.follow(context, state, now, angle(wheel.position), velocities)
-            starts, seen = self._starts, now
+            starts, steps = self._starts, 0
             state.SetAtIndex(0, now)
 
         return follow
@@ -180,11 +178,11 @@ class _Follower:
         self._drive, self._wheel_speed = wheel.drive, int(wheel.drive.velocity_start())
         self._yaw_rate = int(wheel.body.floating_velocities_start_in_v()) + 2
         self._hub: RigidBody = wheel.drive.child_body()
-        self._slots = wheel.slots
+        self._slots, self._slot_speeds = wheel.slots, [int(joint.velocity_start()) for joint in wheel.slots]
         self._frames: list[FixedOffsetFrame] = [joint.frame_on_parent() for joint in wheel.slots]
         self._places = [RigidTransform(RotationMatrix(rotation), p) for rotation, p in roller_poses_H(description)]
         self._inertias = [_spatial(wheel.window.hub_inertia(first)) for first in range(ring.count)]
-        self._share = math.cos(ring.roller_angle) * wheel.window.roller_inertia / wheel.window.axle_inertia
+        self._share = math.cos(ring.roller_angle) * wheel.window.roller_inertia / axle_inertia(description)
 
     def restore(self, context: Context, state: BasicVector, *, everything: bool) -> None:
         """Puts the rollers where a state says; unless everything is to be set anew, if they are not there yet."""
@@ -201,7 +199,7 @@ class _Follower:
         spins, times = self._offset + 1, self._offset + 1 + count
         for m in range(before, before + size):
             if not first <= m < first + size:
-                speed = self._slots[m % size].get_angular_rate(context)
+                speed = velocities.item(self._slot_speeds[m % size])
                 state.SetAtIndex(spins + m % count, speed + window.hub_spin(m, *motion))
                 state.SetAtIndex(times + m % count, now)
                 if motion[1]:

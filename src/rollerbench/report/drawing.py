@@ -9,6 +9,7 @@ from typing import cast
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.projections.polar import PolarAxes
 from mpl_toolkits.mplot3d import Axes3D
@@ -113,6 +114,12 @@ def surface(
 def svg_text(figure: Figure) -> str:
     """The figure as SVG, the same text for the same figure."""
     stream = io.StringIO()
+    FigureCanvasSVG(figure)
+    layout = figure.get_layout_engine()
+    if layout is not None:
+        # Laid out once: left to savefig, the figure would be laid out and drawn twice.
+        layout.execute(figure)
+        figure.set_layout_engine(None)
     # A fixed salt and no date: the same run gives the same file.
     with mpl.rc_context({"svg.hashsalt": "rollerbench", "svg.fonttype": "path"}):
         figure.savefig(stream, format="svg", metadata={"Date": None})

@@ -52,6 +52,8 @@ def robot_to_mjcf(
     option = _add(root, "option", timestep=_numbers([time_step]), gravity=_numbers(gravity), cone="elliptic")
     option.set("integrator", "Euler")
     option.set("impratio", "100")
+    # Rollers on different wheels do not feel each other; MuJoCo chooses this only from 60 velocities on.
+    option.set("jacobian", "sparse")
     _add(option, "flag", autoreset="disable")
     world = _add(root, "worldbody")
     # MuJoCo takes the larger friction and the mean of the stiffnesses: the wheels carry the combined friction.

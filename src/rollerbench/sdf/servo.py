@@ -16,7 +16,7 @@ class ServoGains:
     """Gains of Drake's implicit PD servos, by wheel name.
 
     Attributes:
-        drive_damping: Torque over the error of the wheel speed [N m s].
+        drive_damping: Torque over the error of the wheel speed [N m s]; wheels without one have no servo.
         steering_stiffness: Torque over the error of the steering angle [N m].
         steering_damping: Torque over the error of the steering speed [N m s].
     """

@@ -1,7 +1,6 @@
 """Which of a wheel's rollers are simulated where only those near the ground are."""
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -9,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from rollerbench.description import Robot, RollerWheel
-from rollerbench.description.inertia import RigidInertia, combined
-from rollerbench.description.mass import hub_inertia, roller_inertia, roller_poses_H
+from rollerbench.description.inertia import RigidInertia
+from rollerbench.description.mass import hub_with_rollers, roller_inertia
+from rollerbench.description.rollers import RollerRing
 
 DEFAULT_SIZE = 2
 """Simulated rollers of a wheel: on level ground it stands on one, or is handed over from one to the next."""
@@ -35,13 +35,28 @@ class Window:
     wheel: RollerWheel
     size: int
 
+    @cached_property
+    def ring(self) -> RollerRing:
+        """All rollers of the wheel."""
+        return self.wheel.ring
+
+    @cached_property
+    def pitch(self) -> float:
+        """Wheel angle from one roller to the next [rad]."""
+        return self.ring.pitch
+
+    @cached_property
+    def cos_sin(self) -> tuple[float, float]:
+        """Of the angle g from the axle to the rollers' axes."""
+        return math.cos(self.ring.roller_angle), math.sin(self.ring.roller_angle)
+
     def first_at(self, wheel_angle: float) -> int:
         """First roller of the window whose middle is nearest to the bottom, at a wheel angle [rad]."""
-        return round(-wheel_angle / self.wheel.ring.pitch - 0.5 * (self.size - 1))
+        return round(-wheel_angle / self.pitch - 0.5 * (self.size - 1))
 
     def rollers(self, first: int) -> list[int]:
         """Rollers (size,) of the ring in the slots."""
-        ring = [(slot, m % self.wheel.ring.count) for m in range(first, first + self.size) for slot in [m % self.size]]
+        ring = [(slot, m % self.ring.count) for m in range(first, first + self.size) for slot in [m % self.size]]
         return [roller for _, roller in sorted(ring)]
 
     def hub_spin(self, roller: int, wheel_angle: Any, wheel_speed: Any, yaw_rate: Any) -> Any:
@@ -56,10 +71,9 @@ class Window:
             wheel_speed: Its rate, likewise [rad/s].
             yaw_rate: Yaw rate of the body, likewise [rad/s].
         """
-        ring = self.wheel.ring
+        cos_g, sin_g = self.cos_sin
         sin = np.sin if isinstance(wheel_angle, np.ndarray) else math.sin  # The scalar one is ten times as fast.
-        across = math.sin(ring.roller_angle) * sin(ring.pitch * roller + wheel_angle)
-        return math.cos(ring.roller_angle) * wheel_speed + across * yaw_rate
+        return cos_g * wheel_speed + sin_g * sin(self.pitch * roller + wheel_angle) * yaw_rate
 
     def remembered(self, spin: Any, elapsed: Any, wheel_speed: Any) -> Any:
         """Angular velocity w_R . u of a roller along its axis, some time after it left the window [rad/s].
@@ -72,7 +86,7 @@ class Window:
             wheel_speed: Speed of the wheel about its axle, likewise [rad/s].
         """
         exp = np.exp if isinstance(elapsed, np.ndarray) else math.exp
-        mean = math.cos(self.wheel.ring.roller_angle) * wheel_speed
+        mean = self.cos_sin[0] * wheel_speed
         return mean + (spin - mean) * exp(-self.decay_rate * elapsed)
 
     @cached_property
@@ -87,23 +101,8 @@ class Window:
 
     def hub_inertia(self, first: int) -> RigidInertia:
         """Mass distribution in H of the hub with the rollers that are not simulated."""
-        held = set(range(self.wheel.ring.count)) - set(self.rollers(first))
-        return self._hub_with(sorted(held))
-
-    @property
-    def axle_inertia(self) -> float:
-        """Rotational inertia of hub and rollers about the axle [kg m2]."""
-        return float(self._hub_with(range(self.wheel.ring.count)).moment[1, 1])
-
-    def _hub_with(self, rollers: Iterable[int]) -> RigidInertia:
-        """The hub with some of its rollers.
-
-        These turn freely about their axes u, so they resist no turn about it: I_roller - I_axial u u^T.
-        """
-        roller, poses = roller_inertia(self.wheel), roller_poses_H(self.wheel)
-        across = roller.moment - np.diag([roller.moment[0, 0], 0.0, 0.0])
-        free = RigidInertia(mass=roller.mass, com=roller.com, moment=across)
-        return combined([hub_inertia(self.wheel), *(free.moved(*poses[index]) for index in rollers)])
+        held = set(range(self.ring.count)) - set(self.rollers(first))
+        return hub_with_rollers(self.wheel, sorted(held))
 
 
 def windows(robot: Robot, size: int = DEFAULT_SIZE) -> dict[str, Window]:
@@ -134,4 +133,4 @@ def reach(window: Window) -> float:
 
     The window follows the bottom within half a pitch, and half a pitch of the last roller's own does not count.
     """
-    return (0.5 * window.size - 0.5 - HYSTERESIS) * window.wheel.ring.pitch
+    return (0.5 * window.size - 0.5 - HYSTERESIS) * window.pitch

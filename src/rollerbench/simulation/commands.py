@@ -148,6 +148,38 @@ class WheelSpeedsCommand(Part):
         return sum_of_steps(starts, stops, heights)
 
 
+class WheelEffortsCommand(Part):
+    """Torques of the driven wheels by name, held between smooth ramps; nothing controls the wheels' speeds.
+
+    Attributes:
+        wheel_efforts: Torques at the wheels, positive forward [N m]; 0 for those left out.
+        ramp: Time of the smooth start, and of the smooth stop [s]; one step of the plant at least.
+    """
+
+    type: Literal["wheel_efforts"] = "wheel_efforts"
+    wheel_efforts: dict[str, Number]
+    ramp: NonNegative = 0.0
+
+    def problems(self, robot: Robot, duration: float, time_step: float) -> Iterator[Problem]:
+        """Names that are no driven wheels, torques that their motors do not have, and too long ramps."""
+        wheels = {wheel.name: wheel for wheel in robot.driven_wheels}
+        for name, effort in self.wheel_efforts.items():
+            if name not in wheels:
+                message = f"not a driven wheel of {robot.name}; accepted: {', '.join(wheels) or 'none'}"
+                yield Problem(("command", "wheel_efforts", name), message)
+            elif (limit := wheels[name].max_effort) is not None and abs(effort) > limit:
+                message = f"more than the motor has; accepted: from {-limit:g} to {limit:g}"
+                yield Problem(("command", "wheel_efforts", name), message, effort)
+        yield from _ramp_problems(self.ramp, duration)
+
+    def wheel_effort_profile(self, robot: Robot, duration: float, time_step: float) -> Profile:
+        """Torques (n_driven) over time."""
+        ramp = min(max(self.ramp, time_step), 0.5 * duration)
+        return held_with_ramps(
+            [self.wheel_efforts.get(wheel.name, 0.0) for wheel in robot.driven_wheels], duration, ramp
+        )
+
+
 class _AlongPath(Part):
     """What commands that follow a path share.
 
@@ -288,7 +320,10 @@ class PathCommand(_AlongPath):
                 return [paths.spline(self.points or (), tangent=tangent)]
 
 
-Command = Annotated[TwistCommand | WheelSpeedsCommand | WaypointsCommand | PathCommand, Field(discriminator="type")]
+Command = Annotated[
+    TwistCommand | WheelSpeedsCommand | WheelEffortsCommand | WaypointsCommand | PathCommand,
+    Field(discriminator="type"),
+]
 
 
 def _ramp_problems(ramp: float, duration: float) -> Iterator[Problem]:

@@ -31,6 +31,16 @@ def check(scenario: Scenario) -> None:
     """
     if importlib.util.find_spec("mujoco") is None:
         raise ResourceError(f"engine = {scenario.engine!r}: MuJoCo is missing: pip install 'rollerbench[mujoco]'")
+    if scenario.motion.wheel_efforts is not None or scenario.controller.servo != "implicit":
+        raise DescriptionError(
+            f"engine = {scenario.engine!r}: torques of wheels are commanded in Drake only; accepted: engine: drake, or "
+            "another command, with servo: implicit"
+        )
+    if scenario.ground.roll_resistance:
+        raise DescriptionError(
+            f"engine = {scenario.engine!r}: ground.roll_resistance is simulated by Drake only; accepted: engine: "
+            "drake, or roll_resistance: 0"
+        )
     if scenario.errors.drives(scenario.robot) is not None or scenario.errors.ground_bumps is not None:
         raise DescriptionError(
             f"engine = {scenario.engine!r}: gear_error, backlash_deg, encoder_counts and ground_bumps under errors are "

@@ -14,29 +14,48 @@ from ruamel.yaml.error import YAMLError
 
 from rollerbench.description import Robot, load_robot
 from rollerbench.description.files import read_yaml, validate
-from rollerbench.description.part import Flag, Name, Number, Part, Positive
+from rollerbench.description.part import Flag, Name, NonNegative, Number, Part, Positive
 from rollerbench.description.problems import Problem, refuse
 from rollerbench.errors import DescriptionError, RollerbenchError
 from rollerbench.kinematics import WheelKinematics
 from rollerbench.kinematics.bumps import Bumps
-from rollerbench.kinematics.motion import Motion, twist_motion, wheel_motion
+from rollerbench.kinematics.dynamics import RollingDynamics
+from rollerbench.kinematics.motion import Motion, effort_motion, twist_motion, wheel_motion
 from rollerbench.kinematics.profile import reference_poses
 from rollerbench.resources import scenario_file
 from rollerbench.sdf.servo import DRIVE_TIME_CONSTANT
 from rollerbench.sdf.window import DEFAULT_SIZE, size_on_bumps
-from rollerbench.simulation.commands import Command, WheelSpeedsCommand
+from rollerbench.simulation.commands import Command, WheelEffortsCommand, WheelSpeedsCommand
 from rollerbench.simulation.imperfections import Errors
+
+
+class PidSettings(Part):
+    """Gains of the wheels' speed controllers (`rollerbench.systems.WheelSpeedController`), the same for all wheels.
+
+    Attributes:
+        kp: Torque over the speed error [N m s/rad].
+        ki: Torque over the integral of the speed error [N m/rad].
+        kd: Torque over the rate of the speed [N m s2/rad].
+    """
+
+    kp: Positive
+    ki: NonNegative = 0.0
+    kd: NonNegative = 0.0
 
 
 class OpenLoop(Part):
     """Wheel speeds from the command by inverse kinematics, without feedback of the pose.
 
     Attributes:
+        servo: What makes the wheels follow: "implicit", the plant's own stiff servo, or "pid", explicit torques.
+        pid: Gains, where servo is "pid"; by default such that follow from the robot (`wheel_speed_gains`).
         servo_time_constant: Time in which the wheel servos make up a speed difference of the whole robot [s].
         rollers: "textbook", or "finite" for equations that count the rollers of Mecanum wheels (`WheelKinematics`).
     """
 
     type: Literal["open_loop"] = "open_loop"
+    servo: Literal["implicit", "pid"] = "implicit"
+    pid: PidSettings | None = None
     servo_time_constant: Positive = DRIVE_TIME_CONSTANT
     rollers: Literal["textbook", "finite"] = "textbook"
 
@@ -79,12 +98,12 @@ class Ground(Part):
     Attributes:
         friction: Coefficient of friction; with a wheel's it combines to 2ab/(a+b).
         slope_deg: Inclination; the world's x axis points uphill.
-        roll_resistance: Rolling resistance over load; only 0 can be simulated yet.
+        roll_resistance: Rolling resistance over load, of wheels and of rollers along the ground.
     """
 
     friction: Positive = 0.8
     slope_deg: Annotated[Number, Field(gt=-90, lt=90)] = 0.0
-    roll_resistance: Annotated[Number, Field(ge=0, le=0)] = 0.0
+    roll_resistance: Annotated[Number, Field(ge=0, lt=1)] = 0.0
 
 
 class SimulatorSettings(Part):
@@ -164,6 +183,13 @@ class Scenario(Part):
     def _command_fits(self) -> Self:
         problems = list(self.command.problems(self.robot, self.duration, self.plant.time_step))
         problems += self.errors.problems(self.robot)
+        if self.controller.pid is not None and self.controller.servo != "pid":
+            problems.append(Problem(("controller", "pid"), "gains without their controller; accepted: with servo: pid"))
+        if isinstance(self.command, WheelEffortsCommand) and self.errors.drives(self.robot) is not None:
+            message = (
+                "torques do not go through a drivetrain; accepted: without gear_error, backlash_deg, encoder_counts"
+            )
+            problems.append(Problem(("errors",), message))
         if not self.robot.driven_wheels:
             problems.append(Problem(("robot",), "no wheel is driven; accepted: a robot with driven: true somewhere"))
         if self.plant.time_step > self.duration:
@@ -210,7 +236,11 @@ class Scenario(Part):
             DescriptionError: a wheel would have to turn faster than its max_speed.
         """
         kinematics = WheelKinematics(self.robot, rollers=self.controller.rollers)
-        if isinstance(self.command, WheelSpeedsCommand):
+        if isinstance(self.command, WheelEffortsCommand):
+            dynamics = RollingDynamics(kinematics, self.ground.roll_resistance)
+            efforts = self.command.wheel_effort_profile(self.robot, self.duration, self.plant.time_step)
+            motion = effort_motion(dynamics, efforts, self.duration, self.plant.time_step)
+        elif isinstance(self.command, WheelSpeedsCommand):
             speeds = self.command.wheel_speed_profile(self.robot, self.duration, self.plant.time_step)
             motion = wheel_motion(kinematics, speeds)
         else:

@@ -1,6 +1,6 @@
 """The diagram that a scenario simulates: command, kinematics, servo, plant."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -20,11 +20,20 @@ from pydrake.trajectories import PiecewisePolynomial
 
 from rollerbench.errors import DescriptionError
 from rollerbench.kinematics.profile import Profile
-from rollerbench.plant import RobotModel, add_ground, add_robot, servo_gains
-from rollerbench.simulation.commands import WheelSpeedsCommand
+from rollerbench.plant import RobotModel, ServoGains, add_ground, add_robot, servo_gains
+from rollerbench.simulation.commands import WheelEffortsCommand, WheelSpeedsCommand
 from rollerbench.simulation.drake_config import plant_config
 from rollerbench.simulation.scenario import Scenario, load_scenario
-from rollerbench.systems import Drivetrain, InverseKinematics, Odometry, PlanarState
+from rollerbench.systems import (
+    Drivetrain,
+    InverseKinematics,
+    Odometry,
+    PidGains,
+    PlanarState,
+    RollResistance,
+    SlipMonitor,
+    WheelSpeedController,
+)
 from rollerbench.visualization.scene import add_bump_visuals, add_ground_visual, add_meshcat
 
 
@@ -59,6 +68,7 @@ class Station(Diagram):
         wheel_speed_command (n_driven): commanded wheel speeds [rad/s].
         wheel_speeds (n_driven): wheel speeds that the encoders measure [rad/s].
         net_actuation (n_actuators): torques of the servos [N m].
+        slip_speeds (n_wheels): how fast wheels slide over the ground [m/s] (`SlipMonitor`).
         odometry_q_xyt (3): pose from these measured wheel speeds [m, m, rad].
         rollers (...): state of the `RollerWindow`; only if rollers are windowed.
         contact_results: Drake's ContactResults.
@@ -95,11 +105,10 @@ class Station(Diagram):
         super().__init__()
         builder = DiagramBuilder()
         plant, scene_graph = _add_plant(builder, scenario)
-        gains = servo_gains(scenario.robot, time_constant=scenario.controller.servo_time_constant)
         model = add_robot(
             plant,
             scenario.simulated_robot,
-            gains=gains,
+            gains=_gains(scenario, external=command == "external"),
             roller_model=scenario.plant.roller_model,
             builder=builder,
             window_size=scenario.window_size,
@@ -109,8 +118,8 @@ class Station(Diagram):
         plant.Finalize()
 
         command_port = _add_command(builder, scenario, external=command == "external")
-        servo_port, measured_port = _add_drivetrain(builder, scenario, model, command_port)
-        _connect_servo(builder, scenario, model, servo_port, external=command == "external")
+        measured_port = _add_motors(builder, scenario, model, command_port, external=command == "external")
+        _add_roll_resistance(builder, scenario, model)
         outputs = {
             "state": plant.get_state_output_port(model.model_instance),
             "wheel_speed_command": command_port,
@@ -121,6 +130,9 @@ class Station(Diagram):
         }
         if model.roller_window is not None:
             outputs["rollers"] = model.roller_window.GetOutputPort("rollers")
+        slip = builder.AddNamedSystem("slip_monitor", SlipMonitor(model))
+        builder.Connect(outputs["contact_results"], slip.GetInputPort("contact_results"))
+        outputs["slip_speeds"] = slip.GetOutputPort("slip_speeds")
         body = builder.AddNamedSystem("body_state", MatrixGain(model.body_state_matrix()))
         builder.Connect(outputs["state"], body.get_input_port())
         planar = builder.AddNamedSystem("planar_state", PlanarState())
@@ -170,10 +182,20 @@ def _add_ground(plant: MultibodyPlant, scenario: Scenario, *, drawn: bool) -> No
             add_bump_visuals(plant, carrier, bumps)
 
 
+def _gains(scenario: Scenario, *, external: bool) -> ServoGains:
+    """Gains of the plant's servos: none for wheels that are driven by torques."""
+    gains = servo_gains(scenario.robot, time_constant=scenario.controller.servo_time_constant)
+    return replace(gains, drive_damping={}) if _by_torques(scenario, external=external) else gains
+
+
+def _by_torques(scenario: Scenario, *, external: bool) -> bool:
+    return scenario.controller.servo == "pid" or (not external and scenario.motion.wheel_efforts is not None)
+
+
 def _add_command(builder: DiagramBuilder, scenario: Scenario, *, external: bool) -> OutputPort:
-    """The output port of the commanded wheel speeds."""
+    """The output port of the commanded wheel speeds; where torques are commanded, of those that they should lead to."""
     motion = scenario.motion
-    if not external and (motion.steers or isinstance(scenario.command, WheelSpeedsCommand)):
+    if not external and (motion.steers or isinstance(scenario.command, WheelSpeedsCommand | WheelEffortsCommand)):
         return builder.AddNamedSystem("wheel_speed_command", _source(motion.wheel_speeds)).get_output_port()
     kinematics = builder.AddNamedSystem("inverse_kinematics", InverseKinematics(motion.kinematics))
     if external:
@@ -182,6 +204,51 @@ def _add_command(builder: DiagramBuilder, scenario: Scenario, *, external: bool)
         twist = builder.AddNamedSystem("twist_command", _source(motion.twist))
         builder.Connect(twist.get_output_port(), kinematics.GetInputPort("v_xyw_B"))
     return kinematics.GetOutputPort("wheel_speeds")
+
+
+def _add_motors(
+    builder: DiagramBuilder, scenario: Scenario, model: RobotModel, command_port: OutputPort, *, external: bool
+) -> OutputPort:
+    """Connects what drives and steers the wheels; returns the output port of the wheel speeds that are measured."""
+    servo_port, measured_port = _add_drivetrain(builder, scenario, model, command_port)
+    if not _by_torques(scenario, external=external):
+        _connect_servo(builder, scenario, model, servo_port, external=external)
+        return measured_port
+    if model.robot.steered_wheels:
+        still = ConstantVectorSource(np.zeros(len(model.robot.driven_wheels)))
+        _connect_servo(
+            builder, scenario, model, builder.AddNamedSystem("no_servo", still).get_output_port(), external=external
+        )
+    if scenario.motion.wheel_efforts is not None and not external:
+        efforts = builder.AddNamedSystem("wheel_effort_command", _source(scenario.motion.wheel_efforts))
+        effort_port = efforts.get_output_port()
+    else:
+        settings = scenario.controller.pid
+        gains = None
+        if settings is not None:
+            gains = [PidGains(kp=settings.kp, ki=settings.ki, kd=settings.kd)] * len(scenario.robot.driven_wheels)
+        pid = WheelSpeedController(scenario.robot, scenario.plant.time_step, gains)
+        controller = builder.AddNamedSystem("wheel_speed_controller", pid)
+        builder.Connect(servo_port, controller.GetInputPort("wheel_speed_command"))
+        builder.Connect(measured_port, controller.GetInputPort("wheel_speeds"))
+        effort_port = controller.GetOutputPort("wheel_efforts")
+    motors = builder.AddNamedSystem("motors", MatrixGain(model.actuation_matrix()))
+    builder.Connect(effort_port, motors.get_input_port())
+    builder.Connect(motors.get_output_port(), model.plant.get_actuation_input_port(model.model_instance))
+    return measured_port
+
+
+def _add_roll_resistance(builder: DiagramBuilder, scenario: Scenario, model: RobotModel) -> None:
+    if not scenario.ground.roll_resistance:
+        return
+    plant = model.plant
+    velocities = np.hstack([np.zeros((plant.num_velocities(), plant.num_positions())), np.eye(plant.num_velocities())])
+    selector = builder.AddNamedSystem("velocities", MatrixGain(velocities))
+    builder.Connect(plant.get_state_output_port(), selector.get_input_port())
+    drag = builder.AddNamedSystem("roll_resistance", RollResistance(model, scenario.ground.roll_resistance))
+    builder.Connect(plant.get_contact_results_output_port(), drag.GetInputPort("contact_results"))
+    builder.Connect(selector.get_output_port(), drag.GetInputPort("velocities"))
+    builder.Connect(drag.GetOutputPort("generalized_force"), plant.get_applied_generalized_force_input_port())
 
 
 def _add_drivetrain(

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollerbench.description import OmniWheel, Robot, load_robot
-from rollerbench.description.mass import roller_inertia, spin_inertia
+from rollerbench.description.mass import axle_inertia, roller_inertia
 from rollerbench.kinematics import limits
 from rollerbench.report.drawing import Curve, curves, surface
 from rollerbench.simulation import RunResult, Scenario
@@ -55,7 +55,7 @@ def _with_inertias(wheel: object) -> OmniWheel:
     rollers = wheel.rollers.model_copy(update={"mass": roller_mass})
     light = wheel.model_copy(update={"rollers": rollers, **fields})
     heavy = light.model_copy(update={"mass": light.mass + 1.0})
-    more = (PRINTED.wheel_inertia - spin_inertia(light)) / (spin_inertia(heavy) - spin_inertia(light))
+    more = (PRINTED.wheel_inertia - axle_inertia(light)) / (axle_inertia(heavy) - axle_inertia(light))
     return light.model_copy(update={"mass": light.mass + more})
 
 

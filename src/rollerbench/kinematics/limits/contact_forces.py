@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from rollerbench.description import Robot
 from rollerbench.description.inertia import GRAVITY
-from rollerbench.description.mass import hub_inertia, roller_inertia, spin_inertia
+from rollerbench.description.mass import axle_inertia, hub_inertia, roller_inertia
 from rollerbench.description.wheels import RollerWheel
 from rollerbench.kinematics.limits.loads import spring_loads, supporting_wheels
 from rollerbench.kinematics.rows import wheel_rows
@@ -82,7 +82,7 @@ class ContactForces:
         self._slope = np.array([wheel.roller_slope for wheel in wheels])
         self._cos = 1.0 / np.hypot(1.0, self._slope)
         self._radius = np.array([wheel.radius for wheel in wheels])
-        self._J_d = np.array([spin_inertia(wheel) for wheel in wheels])
+        self._J_d = np.array([axle_inertia(wheel) for wheel in wheels])
         # J_p / r^2: the mass that a roller's spin adds across its axis; none for tyres.
         self._roller_mass = np.array([_roller_mass(wheel) for wheel in wheels])
 

@@ -1,0 +1,136 @@
+"""Drake Systems that read a plant's contacts: slip of the wheels, and rolling resistance."""
+
+import math
+
+import numpy as np
+from pydrake.common.value import Value
+from pydrake.multibody.plant import ContactResults, PointPairContactInfo
+from pydrake.multibody.tree import RevoluteJoint
+from pydrake.systems.framework import BasicVector, Context, DiscreteValues, EventStatus, LeafSystem
+
+from rollerbench.errors import SimulationError
+from rollerbench.plant import RobotModel
+
+STEPS_TO_STOP = 4.0
+"""Rolling resistance falls off below the speed that it could take away in so many steps [-]."""
+
+
+class SlipMonitor(LeafSystem):
+    """How fast each wheel slides over what it touches, from the contacts that the plant finds.
+
+    Input ports:
+        contact_results: Drake's ContactResults.
+    Output ports:
+        slip_speeds (n_wheels): speed of the wheel's or roller's surface over the ground, where it is fastest [m/s]; 0
+            for a wheel in the air. In the order of robot.yaml.
+        normal_forces (n_wheels): load of each wheel [N].
+    """
+
+    def __init__(self, model: RobotModel) -> None:
+        """Makes the system for a robot in a plant."""
+        super().__init__()
+        self._wheel_of = _wheel_of_body(model)
+        self._contacts = self.DeclareAbstractInputPort("contact_results", Value(ContactResults()))
+        count = len(model.robot.wheels)
+        self.DeclareVectorOutputPort("slip_speeds", count, self._calc_slip)
+        self.DeclareVectorOutputPort("normal_forces", count, self._calc_loads)
+
+    def _calc_slip(self, context: Context, output: BasicVector) -> None:
+        slip = np.zeros(output.size())
+        contacts = self._contacts.Eval(context)
+        for index in range(contacts.num_point_pair_contacts()):
+            info = contacts.point_pair_contact_info(index)
+            for wheel in _wheels_in(info, self._wheel_of):
+                slip[wheel] = max(slip[wheel], info.slip_speed())
+        output.SetFromVector(slip)
+
+    def _calc_loads(self, context: Context, output: BasicVector) -> None:
+        loads = np.zeros(output.size())
+        contacts = self._contacts.Eval(context)
+        for index in range(contacts.num_point_pair_contacts()):
+            info = contacts.point_pair_contact_info(index)
+            for wheel in _wheels_in(info, self._wheel_of):
+                loads[wheel] += _normal_force(info)
+        output.SetFromVector(loads)
+
+
+class RollResistance(LeafSystem):
+    """Torques that oppose the rolling of wheels and of rollers, in proportion to the load on them.
+
+    On the axle of a wheel under the load N the torque f N R sign(q'), and on the axis of a roller the torque
+    f N r sign(s): over the ground each is a drag f N along its direction of rolling. Near rest the sign is a smooth
+    tanh, wide enough for the time step. The loads are those of the step before.
+
+    Input ports:
+        contact_results: Drake's ContactResults.
+        velocities (nv): velocities of the plant.
+    Output ports:
+        generalized_force (nv): for the plant's applied_generalized_force port [N m].
+    """
+
+    def __init__(self, model: RobotModel, coefficient: float) -> None:
+        """Makes the system for a robot in a plant that is finalized.
+
+        Args:
+            model: The robot.
+            coefficient: Rolling resistance over load f [-].
+        """
+        super().__init__()
+        if not (math.isfinite(coefficient) and coefficient >= 0):
+            raise SimulationError(f"coefficient = {coefficient}: accepted: 0 or more")
+        plant = model.plant
+        self._rolling = _rolling_of_body(model)
+        gravity = float(np.linalg.norm(plant.gravity_field().gravity_vector()))
+        self._f = coefficient
+        self._slow = max(1e-4, STEPS_TO_STOP * coefficient * gravity * plant.time_step())
+        self._contacts = self.DeclareAbstractInputPort("contact_results", Value(ContactResults()))
+        self._velocities = self.DeclareVectorInputPort("velocities", plant.num_velocities())
+        index = self.DeclareDiscreteState(plant.num_velocities())
+        self.DeclareStateOutputPort("generalized_force", index)
+        self.DeclarePeriodicDiscreteUpdateEvent(plant.time_step(), 0.0, self._update)
+
+    def _update(self, context: Context, state: DiscreteValues) -> EventStatus:
+        contacts, velocities = self._contacts.Eval(context), self._velocities.Eval(context)
+        force = np.zeros(len(velocities))
+        for number in range(contacts.num_point_pair_contacts()):
+            info = contacts.point_pair_contact_info(number)
+            drag = self._f * _normal_force(info)
+            for body in (int(info.bodyA_index()), int(info.bodyB_index())):
+                for index, radius in self._rolling.get(body, ()):
+                    force[index] -= drag * radius * math.tanh(radius * velocities[index] / self._slow)
+        state.get_mutable_vector(0).SetFromVector(force)
+        return EventStatus.Succeeded()
+
+
+def _wheel_of_body(model: RobotModel) -> dict[int, int]:
+    """Indices of the wheels by those of their hubs and rollers."""
+    found = {}
+    for index, wheel in enumerate(model.robot.wheels):
+        for joint in (model.drive_joint(wheel), *model.roller_joints(wheel)):
+            found[int(joint.child_body().index())] = index
+    return found
+
+
+def _rolling_of_body(model: RobotModel) -> dict[int, list[tuple[int, float]]]:
+    """What rolls where a body touches: indices in the velocities, with radii [m]."""
+
+    def axis(joint: RevoluteJoint, radius: float) -> tuple[int, float]:
+        return int(joint.velocity_start()), radius
+
+    found = {}
+    for wheel in model.robot.wheels:
+        drive = model.drive_joint(wheel)
+        found[int(drive.child_body().index())] = [axis(drive, wheel.radius)]
+        for joint in model.roller_joints(wheel):
+            radius = wheel.ring.roller_radius if wheel.ring else 0.0
+            found[int(joint.child_body().index())] = [axis(drive, wheel.radius), axis(joint, radius)]
+    return found
+
+
+def _wheels_in(info: PointPairContactInfo, wheel_of: dict[int, int]) -> list[int]:
+    bodies = (int(info.bodyA_index()), int(info.bodyB_index()))
+    return [wheel_of[body] for body in bodies if body in wheel_of]
+
+
+def _normal_force(info: PointPairContactInfo) -> float:
+    return abs(float(info.contact_force() @ info.point_pair().nhat_BA_W))
