@@ -96,6 +96,10 @@ def part(limit: Limit, index: Any) -> Limit:
     )
 
 
+STEPS = 2.0 + len(VARIANTS)
+"""Steps of `capability`, for progress bars."""
+
+
 def capability(
     robot: Robot,
     *,
@@ -115,14 +119,13 @@ def capability(
         KinematicsError: an argument is malformed.
     """
     show = progress or (lambda done, total: None)
-    total = float(2 + len(VARIANTS))
     directions = travel_directions(robot)
     isotropy, polygon = limits.isotropy(robot), _polygon(robot)
     fastest = limits.max_yaw_rate(robot)
     turning = float(fastest.value) if fastest.feasible else math.nan
     yaw_rates = np.array(YAW_SHARES) * turning if fastest.feasible else np.zeros(1)
     speeds = limits.max_speed(robot, directions, yaw_rate=yaw_rates[:, np.newaxis])
-    show(1.0, total)
+    show(1.0, STEPS)
     accelerations = {}
     for done, (name, (sharing, adhesion)) in enumerate(VARIANTS.items(), start=2):
         accelerations[name] = limits.max_acceleration(
@@ -133,13 +136,13 @@ def capability(
             sharing=sharing,
             adhesion=adhesion,
         )
-        show(float(done), total)
+        show(float(done), STEPS)
     largest = np.nanmax(accelerations["best"].value, initial=0.0)
     steps = _steps(float(largest))
     efforts = limits.wheel_efforts(
         robot, directions[:, np.newaxis], steps, roll_resistance=roll_resistance, strict=False
     )
-    show(total, total)
+    show(STEPS, STEPS)
     smallest = np.nanmin(accelerations["least_norm"].value, initial=np.inf)
     return Capability(
         robot=robot,

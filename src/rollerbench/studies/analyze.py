@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rollerbench.analysis.limits import Capability, capability
+from rollerbench.analysis.limits import STEPS, Capability, capability
 from rollerbench.description import Robot, load_robot
 from rollerbench.description.files import write_atomically
 from rollerbench.errors import ResourceError
@@ -73,7 +73,7 @@ def analyze(
         loaded,
         roll_resistance=roll_resistance,
         ground_friction=ground_friction,
-        progress=lambda done, total: show(done, total + 1.0),
+        progress=lambda done, total: show(done, STEPS + 1.0),
     )
     measured = {} if measure is None else measure(found, show)
     figures = limit_figures(found, measured)
@@ -82,10 +82,11 @@ def analyze(
         (folder / name).unlink(missing_ok=True)
     try:
         numbers = {**_numbers(found, measured), "figures": write_figures(folder, figures, earlier)}
-        write_atomically(folder / "analysis.json", json.dumps(numbers, indent=1, allow_nan=False) + "\n")
+        write_atomically(folder / "analysis.json", json.dumps(numbers, allow_nan=False) + "\n")
         write_atomically(folder / "report.html", analysis_page(found, figures, versions()))
     except OSError as error:
         raise ResourceError(f"{folder}: cannot be written: {error}") from error
+    show(STEPS + 1.0, STEPS + 1.0)
     return Analysis(capability=found, measured=measured, folder=folder)
 
 

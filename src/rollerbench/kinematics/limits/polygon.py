@@ -70,9 +70,8 @@ def speed_polygon(robot: Robot | str | Path, yaw_rate: float = 0.0) -> SpeedPoly
             "max_speed, enough of them for every direction of travel"
         )
     corners = _corners(robot, normals, offsets, yaw_rate)
-    edges = [corners] if len(corners) < 3 else [0.5 * (corners + np.roll(corners, -1, axis=0))]
-    slack = offsets - edges[0] @ normals.T if len(normals) else np.empty((len(corners), 0))
-    # The middle of a chord and the limit of another wheel may differ by less than a chord cuts off.
+    middles = corners if len(corners) < 3 else 0.5 * (corners + np.roll(corners, -1, axis=0))
+    slack = offsets - middles @ normals.T
     size = float(np.max(np.abs(offsets), initial=0.0))
     names = [
         tuple(robot.wheels[i].name for i in dict.fromkeys(owners[np.flatnonzero(row <= SAME * size)].tolist()))
@@ -136,7 +135,8 @@ def _corners(robot: Robot, normals: Array, offsets: Array, yaw_rate: float) -> A
         return inside[np.newaxis]
     if dimension == 1:
         along = normals[:, 0]
-        bounds = offsets[along != 0] / along[along != 0]
+        turned = np.abs(along) > SAME
+        bounds = offsets[turned] / along[turned]
         return np.array([[np.max(bounds[bounds < inside])], [np.min(bounds[bounds > inside])]])
     scaled = np.column_stack([normals, -(offsets - normals @ inside) / size])
     found = HalfspaceIntersection(scaled, np.zeros(2)).intersections
@@ -149,9 +149,12 @@ def _deepest(normals: Array, offsets: Array) -> tuple[Array, float]:
     """The point (k,) farthest inside all half-planes, and how far inside it lies; negative if there is none."""
     objective = np.zeros(normals.shape[1] + 1)
     objective[-1] = -1.0
+    lengths = np.linalg.norm(normals, axis=1)
+    # A wheel that no allowed velocity turns leaves no room by itself, or as much as its offset.
+    lengths = np.where(lengths > SAME, lengths, 1.0)
     found = linprog(
         objective,
-        A_ub=np.column_stack([normals, np.linalg.norm(normals, axis=1)]),
+        A_ub=np.column_stack([normals, lengths]),
         b_ub=offsets,
         bounds=[(None, None)] * len(objective),
     )
