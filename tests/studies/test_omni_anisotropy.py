@@ -1,17 +1,15 @@
 """The theoretical half of the reproduction of Leng and Cao (2007)."""
 
-import json
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import rollerbench as rb
-from rollerbench.studies import leng_cao, reproduce
-from rollerbench.studies.omni_anisotropy import EQUAL_LOADS, PAPER, evaluate, paper_robot
+from rollerbench.studies import leng_cao, omni_anisotropy
+from rollerbench.studies.omni_anisotropy import EQUAL_LOADS, paper_robot
 
-FINDINGS = evaluate({})
+FINDINGS = omni_anisotropy.theory()
 
 
 def theory(item: str, quantity: str) -> float:
@@ -91,14 +89,3 @@ def test_the_mistakes_are_proven() -> None:
     metres, millimetres, mended = proof("Equations (24) and (25)")
     assert metres > 5 * millimetres
     assert mended == pytest.approx(theory("Figure 7", "effort of wheels 1 and 3 at 15 deg"), abs=1e-12)
-
-
-def test_it_is_written(tmp_path: Path) -> None:
-    done = reproduce("omni_anisotropy", output=tmp_path, recordings=False)
-    assert done.paper is PAPER
-    names = {picture.name for picture in done.findings.pictures}
-    assert {"figure_04", "figure_07", "figure_08"} <= names
-    assert {path.stem for path in (tmp_path / "figures").iterdir()} == names
-    assert json.loads((tmp_path / "results.json").read_text())["mistakes"]
-    page = (tmp_path / "report.html").read_text()
-    assert all(f'id="{name}"' in page for name in names)

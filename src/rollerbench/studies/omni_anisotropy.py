@@ -66,12 +66,22 @@ def scenarios() -> dict[str, Scenario]:
 
 def evaluate(runs: Mapping[str, RunResult]) -> Findings:
     """All figures, section 3.3, and the mistakes."""
-    robot = paper_robot(60.0)
-    figure_4, section_3_3, figures_7_8 = _figure_4(), _section_3_3(robot), _figures_7_8(robot)
+    found = theory()
     figure_11, figure_12 = omni_runs.figure_11(runs, paper_robot), omni_runs.figure_12(runs["figure_12"])
     return Findings(
-        results=(*figure_4[0], *section_3_3[0], *figures_7_8[0], *figure_11[0], *figure_12[0]),
-        pictures=(figure_4[1], section_3_3[1], *figures_7_8[1], figure_11[1], figure_12[1]),
+        results=(*found.results, *figure_11[0], *figure_12[0]),
+        pictures=(*found.pictures, figure_11[1], figure_12[1]),
+        mistakes=found.mistakes,
+    )
+
+
+def theory() -> Findings:
+    """What takes no simulation: figures 4, 7 and 8, section 3.3, and the mistakes."""
+    robot = paper_robot(60.0)
+    figure_4, section_3_3, figures_7_8 = _figure_4(), _section_3_3(robot), _figures_7_8(robot)
+    return Findings(
+        results=(*figure_4[0], *section_3_3[0], *figures_7_8[0]),
+        pictures=(figure_4[1], section_3_3[1], *figures_7_8[1]),
         mistakes=mistakes(robot),
     )
 

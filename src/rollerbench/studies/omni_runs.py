@@ -74,7 +74,7 @@ def figure_11(runs: Mapping[str, RunResult], robot_of: Callable[[float], Robot])
         what = name.removeprefix("speeds_").replace("_in_steps", " deg, wheel speeds in steps of 0.1 m/s")
         what = what if " " in what else f"{what} deg"
         worst = int(np.argmax(np.linalg.norm(found - wanted, axis=1) / np.linalg.norm(wanted, axis=1)))
-        for index in (9, 0, worst):
+        for index in sorted({0, 27, worst}):
             which = " (worst direction)" if index == worst else ""
             results.append(
                 Result(
