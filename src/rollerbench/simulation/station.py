@@ -247,6 +247,7 @@ def _add_roll_resistance(builder: DiagramBuilder, scenario: Scenario, model: Rob
     builder.Connect(plant.get_state_output_port(), selector.get_input_port())
     drag = builder.AddNamedSystem("roll_resistance", RollResistance(model, scenario.ground.roll_resistance))
     builder.Connect(plant.get_contact_results_output_port(), drag.GetInputPort("contact_results"))
+    builder.Connect(plant.get_body_poses_output_port(), drag.GetInputPort("body_poses"))
     builder.Connect(selector.get_output_port(), drag.GetInputPort("velocities"))
     builder.Connect(drag.GetOutputPort("generalized_force"), plant.get_applied_generalized_force_input_port())
 

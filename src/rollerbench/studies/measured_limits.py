@@ -14,32 +14,29 @@ from pydrake.systems.analysis import Simulator
 
 from rollerbench.analysis.limits import Capability
 from rollerbench.description import Robot, load_robot
+from rollerbench.description.inertia import GRAVITY
 from rollerbench.errors import SimulationError
 from rollerbench.kinematics import limits
 from rollerbench.kinematics.limits.loads import supporting_wheels
 from rollerbench.plant import follow_rollers
 from rollerbench.recording import Recording
 from rollerbench.report.limits import Measured, Points
+from rollerbench.sdf.contact import static_penetration
 from rollerbench.simulation.drake_engine import simulate
 from rollerbench.simulation.scenario import Scenario, load_scenario
 from rollerbench.simulation.station import Station
 
 Array = NDArray[np.float64]
 
-SLIP_STEP = 5e-4
-"""Step of runs that look for slip [s]."""
-
-SLIP_TIME = 0.02
-"""How long such a run pushes [s]: while the wheels still stand as the equations have it. Later their rollers lift them
-by more than wheels sink in, and their loads come and go."""
-
-PUSH_RAMP = 0.008
-"""How long the push takes to build up [s], so that the loads can follow."""
+PUSH_RAMP, SLIP_TIME, SLIP_STEPS = 1.6, 3.0, 60
+"""Runs that look for slip: time in which the push builds up, and whole time, in periods of the robot bouncing on its
+wheels, and steps. The loads must be able to follow, and the wheels still have to stand as the equations have it: later
+their rollers lift them by more than they sink in, and their loads come and go."""
 
 SLIPPING = 0.1
 """A wheel slides when its slip grows by more than this share of the robot's acceleration [-]."""
 
-LIFTED = 0.01
+LIFTED = 0.001
 """A wheel with less than this part of the mean load has lifted off [-]."""
 
 EFFORT_STEP = 2e-3
@@ -163,22 +160,25 @@ def _slip_onset(task: _Task) -> float:
 
 def _gives_way(task: _Task, robot: Robot, acceleration: float) -> bool:
     efforts = _wheel_efforts(task, robot, acceleration)
+    bounce = 2 * math.pi * math.sqrt(static_penetration(robot) / GRAVITY)
+    duration = SLIP_TIME * bounce
     command = {
         "type": "wheel_efforts",
-        "ramp": PUSH_RAMP,
+        "ramp": PUSH_RAMP * bounce,
         "wheel_efforts": {
             wheel.name: float(effort) for wheel, effort in zip(robot.driven_wheels, efforts, strict=True)
         },
     }
-    station = Station(_scenario(task, robot, 2 * SLIP_TIME, command, time_step=SLIP_STEP), visuals=False)
+    # Twice as long, so that the push has not begun to end.
+    station = Station(_scenario(task, robot, 2 * duration, command, time_step=duration / SLIP_STEPS), visuals=False)
     simulator = Simulator(station)
     follow_rollers(simulator)
-    simulator.AdvanceTo(SLIP_TIME)
+    simulator.AdvanceTo(duration)
     monitor = station.GetSubsystemByName("slip_monitor")
     context = monitor.GetMyContextFromRoot(simulator.get_context())
     slip, loads = (monitor.GetOutputPort(name).Eval(context) for name in ("slip_speeds", "normal_forces"))
     carrying = loads[supporting_wheels(robot)]
-    return bool(np.max(slip) > SLIPPING * acceleration * SLIP_TIME or np.min(carrying) < LIFTED * np.mean(carrying))
+    return bool(np.max(slip) > SLIPPING * acceleration * duration or np.min(carrying) < LIFTED * np.mean(carrying))
 
 
 def _efforts(task: _Task) -> Array:

@@ -11,7 +11,7 @@ from rollerbench.description.mass import axle_inertia, roller_inertia
 from rollerbench.kinematics import limits
 from rollerbench.report.drawing import Curve, curves, surface
 from rollerbench.simulation import RunResult, Scenario
-from rollerbench.studies import leng_cao
+from rollerbench.studies import leng_cao, omni_runs
 from rollerbench.studies.leng_cao import PRINTED
 from rollerbench.studies.omni_mistakes import mistakes
 from rollerbench.studies.paper import Findings, Paper, Picture, Result
@@ -60,17 +60,18 @@ def _with_inertias(wheel: object) -> OmniWheel:
 
 
 def scenarios() -> dict[str, Scenario]:
-    """None yet: figures 11 and 12 are simulated, the others are theory."""
-    return {}
+    """Figures 11 and 12; the others are theory."""
+    return omni_runs.scenarios(paper_robot)
 
 
 def evaluate(runs: Mapping[str, RunResult]) -> Findings:
-    """Figures 4, 7 and 8, section 3.3, and the mistakes."""
+    """All figures, section 3.3, and the mistakes."""
     robot = paper_robot(60.0)
     figure_4, section_3_3, figures_7_8 = _figure_4(), _section_3_3(robot), _figures_7_8(robot)
+    figure_11, figure_12 = omni_runs.figure_11(runs, paper_robot), omni_runs.figure_12(runs["figure_12"])
     return Findings(
-        results=(*figure_4[0], *section_3_3[0], *figures_7_8[0]),
-        pictures=(figure_4[1], section_3_3[1], *figures_7_8[1]),
+        results=(*figure_4[0], *section_3_3[0], *figures_7_8[0], *figure_11[0], *figure_12[0]),
+        pictures=(figure_4[1], section_3_3[1], *figures_7_8[1], figure_11[1], figure_12[1]),
         mistakes=mistakes(robot),
     )
 

@@ -69,8 +69,8 @@ def _dynamics(robot: Robot) -> tuple[Mistake, ...]:
         ),
         Mistake(
             where="Equation (18), rollers",
-            claim="In the formula, which is printed for directions below delta/2, the drag of the rollers of wheels 2 "
-            "and 4 holds the robot back whatever the direction.",
+            claim="In the formula, which is printed for directions below delta/2, the drag of the rollers of wheels "
+            "2 and 4 holds the robot back whatever the direction.",
             correction="Beyond 90 deg - delta/2 these rollers turn the other way, and so does their drag.",
             proof={
                 "speed of roller 2 over that of the robot, at 90 deg": (float(np.cos(np.pi / 6 + right_angle)), "-"),

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 from pydrake.common.value import Value
+from pydrake.math import RigidTransform
 from pydrake.multibody.plant import ContactResults, PointPairContactInfo
 from pydrake.multibody.tree import RevoluteJoint
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, EventStatus, LeafSystem
@@ -13,6 +14,10 @@ from rollerbench.plant import RobotModel
 
 STEPS_TO_STOP = 4.0
 """Rolling resistance falls off below the speed that it could take away in so many steps [-]."""
+
+
+AXLE, ROLLER_AXIS = 1, 0
+"""About which of its axes a hub, and a roller, turns."""
 
 
 class SlipMonitor(LeafSystem):
@@ -57,12 +62,14 @@ class SlipMonitor(LeafSystem):
 class RollResistance(LeafSystem):
     """Torques that oppose the rolling of wheels and of rollers, in proportion to the load on them.
 
-    On the axle of a wheel under the load N the torque f N R sign(q'), and on the axis of a roller the torque
-    f N r sign(s): over the ground each is a drag f N along its direction of rolling. Near rest the sign is a smooth
-    tanh, wide enough for the time step. The loads are those of the step before.
+    On the axle of a wheel whose contact carries N at the distance R from it, the torque f N R sign(q'), and on the axis
+    of the roller, at the distance r, the torque f N r sign(s): over the ground each is a drag f N along its direction
+    of rolling. Near rest the sign is a smooth tanh, wide enough for the time step. The loads are those of the step
+    before.
 
     Input ports:
         contact_results: Drake's ContactResults.
+        body_poses: Drake's poses of all bodies in W.
         velocities (nv): velocities of the plant.
     Output ports:
         generalized_force (nv): for the plant's applied_generalized_force port [N m].
@@ -84,20 +91,23 @@ class RollResistance(LeafSystem):
         self._f = coefficient
         self._slow = max(1e-4, STEPS_TO_STOP * coefficient * gravity * plant.time_step())
         self._contacts = self.DeclareAbstractInputPort("contact_results", Value(ContactResults()))
+        self._poses = self.DeclareAbstractInputPort("body_poses", Value[list[RigidTransform]]())
         self._velocities = self.DeclareVectorInputPort("velocities", plant.num_velocities())
         index = self.DeclareDiscreteState(plant.num_velocities())
         self.DeclareStateOutputPort("generalized_force", index)
         self.DeclarePeriodicDiscreteUpdateEvent(plant.time_step(), 0.0, self._update)
 
     def _update(self, context: Context, state: DiscreteValues) -> EventStatus:
-        contacts, velocities = self._contacts.Eval(context), self._velocities.Eval(context)
+        contacts, velocities, poses = (port.Eval(context) for port in (self._contacts, self._velocities, self._poses))
         force = np.zeros(len(velocities))
         for number in range(contacts.num_point_pair_contacts()):
             info = contacts.point_pair_contact_info(number)
             drag = self._f * _normal_force(info)
             for body in (int(info.bodyA_index()), int(info.bodyB_index())):
-                for index, radius in self._rolling.get(body, ()):
-                    force[index] -= drag * radius * math.tanh(radius * velocities[index] / self._slow)
+                for index, link, axis in self._rolling.get(body, ()):
+                    arm = poses[link].inverse().multiply(info.contact_point())
+                    lever = math.hypot(arm[axis - 1], arm[axis - 2])
+                    force[index] -= drag * lever * math.tanh(lever * velocities[index] / self._slow)
         state.get_mutable_vector(0).SetFromVector(force)
         return EventStatus.Succeeded()
 
@@ -111,19 +121,19 @@ def _wheel_of_body(model: RobotModel) -> dict[int, int]:
     return found
 
 
-def _rolling_of_body(model: RobotModel) -> dict[int, list[tuple[int, float]]]:
-    """What rolls where a body touches: indices in the velocities, with radii [m]."""
+def _rolling_of_body(model: RobotModel) -> dict[int, list[tuple[int, int, int]]]:
+    """What rolls where a body touches: index in the velocities, the link, and which of its axes it turns about."""
 
-    def axis(joint: RevoluteJoint, radius: float) -> tuple[int, float]:
-        return int(joint.velocity_start()), radius
+    def rolling(joint: RevoluteJoint, axis: int) -> tuple[int, int, int]:
+        return int(joint.velocity_start()), int(joint.child_body().index()), axis
 
     found = {}
     for wheel in model.robot.wheels:
-        drive = model.drive_joint(wheel)
-        found[int(drive.child_body().index())] = [axis(drive, wheel.radius)]
+        drive = rolling(model.drive_joint(wheel), AXLE)
+        found[drive[1]] = [drive]
         for joint in model.roller_joints(wheel):
-            radius = wheel.ring.roller_radius if wheel.ring else 0.0
-            found[int(joint.child_body().index())] = [axis(drive, wheel.radius), axis(joint, radius)]
+            roller = rolling(joint, ROLLER_AXIS)
+            found[roller[1]] = [drive, roller]
     return found
 
 
