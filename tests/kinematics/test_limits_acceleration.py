@@ -165,8 +165,8 @@ def test_efforts_make_the_acceleration(name: str, direction: float, acceleration
     sense = np.array([*u, 0.0])
     pull = np.zeros(len(driven))
     pull[driven] = efforts
-    pull -= np.sign(np.round(J @ sense, 9)) * resistance * loads * radius
-    force = J.T @ pull - G.T @ (np.sign(np.round(G @ sense, 9)) * resistance * loads[rings])
+    pull -= _sense(radius * (J @ sense)) * resistance * loads * radius
+    force = J.T @ pull - G.T @ (_sense(G @ sense) * resistance * loads[rings])
 
     def rate(_: float, state: np.ndarray) -> np.ndarray:
         twist = state[3:]
@@ -181,6 +181,11 @@ def test_efforts_make_the_acceleration(name: str, direction: float, acceleration
 
     end = solve_ivp(rate, (0.0, 0.5), np.zeros(6), rtol=1e-10, atol=1e-12).y[:, -1]
     assert end[:3] == pytest.approx([*(0.5 * acceleration * 0.5**2 * u), 0.0], abs=1e-8)
+
+
+def _sense(speed: np.ndarray) -> np.ndarray:
+    """Which way a wheel or roller rolls; those that stand still resist neither way."""
+    return np.where(np.abs(speed) <= 1e-9, 0.0, np.sign(speed))
 
 
 def _all_driven(robot: rb.Robot) -> rb.Robot:
