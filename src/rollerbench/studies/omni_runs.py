@@ -71,15 +71,15 @@ def figure_11(runs: Mapping[str, RunResult], robot_of: Callable[[float], Robot])
         robot = robot_of(float(name.split("_")[1]))
         wanted = _quantised(robot) if name == QUANTISED else _polygon(robot)
         found = _found(runs[name])
-        what = name.removeprefix("speeds_").replace("_in_steps", " deg, wheel speeds in steps of 0.1 m/s")
-        what = what if " " in what else f"{what} deg"
+        apart = f"{name.split('_')[1]} deg"
+        steps = ", wheel speeds in steps of 0.1 m/s" if name == QUANTISED else ""
         worst = int(np.argmax(np.linalg.norm(found - wanted, axis=1) / np.linalg.norm(wanted, axis=1)))
         for index in sorted({0, 27, worst}):
             which = " (worst direction)" if index == worst else ""
             results.append(
                 Result(
                     item="Figure 11",
-                    quantity=f"largest speed at {DIRECTIONS_DEG[index] % 360:g} deg{which}, wheels {what} apart",
+                    quantity=f"largest speed at {DIRECTIONS_DEG[index] % 360:g} deg{which}, wheels {apart} apart{steps}",
                     unit="m/s",
                     theory=float(np.hypot(*wanted[index])),
                     simulated=float(np.hypot(*found[index])),
@@ -88,13 +88,13 @@ def figure_11(runs: Mapping[str, RunResult], robot_of: Callable[[float], Robot])
         if name != QUANTISED:
             corners = limits.speed_polygon(robot).vertices
             closed = np.vstack([corners, corners[:1]])
-            panel.append(Curve(label=f"{what}, equations", x=closed[:, 0], y=closed[:, 1]))
+            panel.append(Curve(label=f"{apart}, equations", x=closed[:, 0], y=closed[:, 1]))
         style = "x" if name == QUANTISED else "."
-        panel.append(Curve(label=f"{what}, Drake", x=found[:, 0], y=found[:, 1], style=style))
+        panel.append(Curve(label=f"{apart}{steps}, Drake", x=found[:, 0], y=found[:, 1], style=style))
     picture = Picture(
         name="figure_11",
         title="Figure 11.",
-        caption="Largest velocities every 10 deg, the fastest wheel at 1 m/s. With wheel speeds in steps of 0.1 m/s, "
+        caption="Largest velocities every 10 deg, the fastest wheel at 1 m/s, for wheels 90, 60 and 30 deg apart. With wheel speeds in steps of 0.1 m/s, "
         "as the paper had them, points scatter about the rhombus: that is arithmetic, not the robot.",
         svg=curves("speed along x [m/s]", {"speed along y [m/s]": panel}, equal=True),
     )
