@@ -79,7 +79,8 @@ def figure_11(runs: Mapping[str, RunResult], robot_of: Callable[[float], Robot])
             results.append(
                 Result(
                     item="Figure 11",
-                    quantity=f"largest speed at {DIRECTIONS_DEG[index] % 360:g} deg{which}, wheels {apart} apart{steps}",
+                    quantity=f"largest speed at {DIRECTIONS_DEG[index] % 360:g} deg{which}, wheels {apart} apart"
+                    + steps,
                     unit="m/s",
                     theory=float(np.hypot(*wanted[index])),
                     simulated=float(np.hypot(*found[index])),
@@ -94,8 +95,9 @@ def figure_11(runs: Mapping[str, RunResult], robot_of: Callable[[float], Robot])
     picture = Picture(
         name="figure_11",
         title="Figure 11.",
-        caption="Largest velocities every 10 deg, the fastest wheel at 1 m/s, for wheels 90, 60 and 30 deg apart. With wheel speeds in steps of 0.1 m/s, "
-        "as the paper had them, points scatter about the rhombus: that is arithmetic, not the robot.",
+        caption="Largest velocities every 10 deg, the fastest wheel at 1 m/s, for wheels 90, 60 and 30 deg apart. With "
+        "wheel speeds in steps of 0.1 m/s, as the paper had them, points scatter about the rhombus: that is arithmetic, "
+        "not the robot.",
         svg=curves("speed along x [m/s]", {"speed along y [m/s]": panel}, equal=True),
     )
     return results, picture
