@@ -96,8 +96,8 @@ def figure_11(runs: Mapping[str, RunResult], robot_of: Callable[[float], Robot])
         name="figure_11",
         title="Figure 11.",
         caption="Largest velocities every 10 deg, the fastest wheel at 1 m/s, for wheels 90, 60 and 30 deg apart. With "
-        "wheel speeds in steps of 0.1 m/s, as the paper had them, points scatter about the rhombus: that is arithmetic, "
-        "not the robot.",
+        "wheel speeds in steps of 0.1 m/s, as the paper had them, points scatter about the rhombus: that is arithmetic "
+        "and not the robot.",
         svg=curves("speed along x [m/s]", {"speed along y [m/s]": panel}, equal=True),
     )
     return results, picture
