@@ -44,7 +44,7 @@ def test_shipped_scenarios_are_named_by_their_files(name: str) -> None:
         ({"plant": {"roller_window": 1}}, ["plant.roller_window = 1", "greater than or equal to 2"]),
         ({"plant": {"time_step": -0.001}}, ["plant.time_step = -0.001", "greater than or equal to"]),
         ({"plant": {"time_step": 0.05}, "duration": 0.04, "command": {**BASE["command"], "ramp": 0.0}}, ["time_step"]),  # type: ignore[dict-item]
-        ({"ground": {"roll_resistance": 0.1}}, ["ground.roll_resistance = 0.1"]),
+        ({"ground": {"roll_resistance": 1.5}}, ["ground.roll_resistance = 1.5", "less than 1"]),
         ({"ground": {"slope_deg": 90}}, ["ground.slope_deg = 90", "less than 90"]),
         ({"errors": {"radius_scale": 1.1}}, ["errors.radius_scale"]),
         ({"seed": -1}, ["seed = -1"]),
