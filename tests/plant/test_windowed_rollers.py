@@ -284,6 +284,22 @@ def test_a_wheel_that_leaps_over_its_rollers_is_named() -> None:
         fast.simulator.AdvanceTo(0.5)
 
 
+def test_a_run_keeps_what_it_computed_until_a_wheel_leapt() -> None:
+    content = {
+        "name": "leap",
+        "robot": mecanum(12),
+        "duration": 1.0,
+        "command": {"type": "twist", "v_xyw_B": [14.0, 0.0, 0.0], "ramp": 0.5},
+    }
+    with (
+        pytest.warns(rb.RollerbenchWarning, match="sixth of its roller pitch"),
+        pytest.raises(rb.SimulationError) as caught,
+    ):
+        rb.run(content, save=False)
+    assert "turned past its simulated rollers" in str(caught.value)
+    assert 10 < len(caught.value.result.recording.time) < 200
+
+
 def test_a_robot_that_leans_beyond_its_rollers_is_a_fault() -> None:
     from pydrake.math import RigidTransform, RollPitchYaw
 

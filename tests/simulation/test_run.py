@@ -281,6 +281,13 @@ def test_the_station_takes_a_twist_from_outside() -> None:
     assert station.GetOutputPort("wheel_speeds").Eval(context) == pytest.approx([0.1 / 0.0475] * 4, rel=1e-3)
 
 
+def test_a_station_with_all_rollers_converts_to_autodiff() -> None:
+    from pydrake.autodiffutils import AutoDiffXd
+
+    station = rb.build_station(rb.load_scenario("youbot_plus_x", overrides={"plant.roller_model": "full"}))
+    assert station.ToScalarType[AutoDiffXd]().num_output_ports() == station.num_output_ports()
+
+
 def test_a_station_starts_on_its_wheels() -> None:
     from pydrake.systems.analysis import Simulator
 

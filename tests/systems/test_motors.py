@@ -153,7 +153,7 @@ def test_slip_monitor_names_the_wheel_that_slides() -> None:
         "command": {"type": "wheel_speeds", "wheel_speeds": {"front_left": 5.0}, "ramp": 0.1},
         "errors": {"friction": {"front_left": 0.05}},
     }
-    station = rb.build_station(scenario)
+    station = rb.build_station(scenario, slip=True)
     assert isinstance(station.GetSubsystemByName("slip_monitor"), SlipMonitor)
     simulator = Simulator(station)
     rb.follow_rollers(simulator)

@@ -97,6 +97,8 @@ def _advance(simulator: Simulator, station: Station, scenario: Scenario, progres
                 progress(now)
     except KeyboardInterrupt:
         return f"interrupted at t = {context.get_time():.3f} s"
+    except SimulationError as error:
+        return str(error)
     except (RuntimeError, SystemExit) as error:
         return f"at t = {context.get_time():.3f} s Drake stopped: {error}"
     return None

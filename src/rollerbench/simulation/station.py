@@ -57,7 +57,8 @@ class StationParts:
 class Station(Diagram):
     """A robot on its ground, driven by a scenario's command.
 
-    Where rollers are windowed, as they are by default, call `follow_rollers(simulator)` before the simulation.
+    Where rollers are windowed, as they are by default, call `follow_rollers(simulator)` before the simulation. With
+    all rollers, and without slip and rolling resistance, all systems are Drake's own, and ToAutoDiffXd() converts it.
 
     Input ports:
         v_xyw_B (3): body twist command [m/s, m/s, rad/s]; only if the command comes from outside.
@@ -68,7 +69,8 @@ class Station(Diagram):
         wheel_speed_command (n_driven): commanded wheel speeds [rad/s].
         wheel_speeds (n_driven): wheel speeds that the encoders measure [rad/s].
         net_actuation (n_actuators): torques of the servos [N m].
-        slip_speeds (n_wheels): how fast wheels slide over the ground [m/s] (`SlipMonitor`).
+        slip_speeds (n_wheels): how fast wheels slide over the ground [m/s] (`SlipMonitor`); only if asked for.
+        normal_forces (n_wheels): loads of the wheels [N]; only if asked for.
         odometry_q_xyt (3): pose from these measured wheel speeds [m, m, rad].
         rollers (...): state of the `RollerWindow`; only if rollers are windowed.
         contact_results: Drake's ContactResults.
@@ -88,6 +90,7 @@ class Station(Diagram):
         meshcat: Meshcat | None = None,
         log: bool = False,
         visuals: bool = True,
+        slip: bool = False,
     ) -> None:
         """Builds the diagram of a scenario.
 
@@ -97,6 +100,7 @@ class Station(Diagram):
             meshcat: Where to show the robot.
             log: Whether to record outputs (see `StationParts.logs`).
             visuals: Whether the robot shall be seen, in the meshcat or by what is connected to query_object.
+            slip: Whether to export slip_speeds and normal_forces.
 
         Raises:
             DescriptionError: Drake refuses a setting of the plant.
@@ -130,9 +134,10 @@ class Station(Diagram):
         }
         if model.roller_window is not None:
             outputs["rollers"] = model.roller_window.GetOutputPort("rollers")
-        slip = builder.AddNamedSystem("slip_monitor", SlipMonitor(model))
-        builder.Connect(outputs["contact_results"], slip.GetInputPort("contact_results"))
-        outputs["slip_speeds"] = slip.GetOutputPort("slip_speeds")
+        if slip:
+            monitor = builder.AddNamedSystem("slip_monitor", SlipMonitor(model))
+            builder.Connect(outputs["contact_results"], monitor.GetInputPort("contact_results"))
+            outputs |= {name: monitor.GetOutputPort(name) for name in ("slip_speeds", "normal_forces")}
         body = builder.AddNamedSystem("body_state", MatrixGain(model.body_state_matrix()))
         builder.Connect(outputs["state"], body.get_input_port())
         planar = builder.AddNamedSystem("planar_state", PlanarState())
@@ -160,9 +165,10 @@ def build_station(
     *,
     command: Literal["scenario", "external"] = "scenario",
     meshcat: Meshcat | None = None,
+    slip: bool = False,
 ) -> Station:
     """The diagram of a scenario, to simulate or to compose with other systems. See `Station`."""
-    return Station(load_scenario(scenario), command=command, meshcat=meshcat)
+    return Station(load_scenario(scenario), command=command, meshcat=meshcat, slip=slip)
 
 
 def _add_plant(builder: DiagramBuilder, scenario: Scenario) -> tuple[MultibodyPlant, SceneGraph]:

@@ -170,13 +170,13 @@ def _gives_way(task: _Task, robot: Robot, acceleration: float) -> bool:
         },
     }
     # Twice as long, so that the push has not begun to end.
-    station = Station(_scenario(task, robot, 2 * duration, command, time_step=duration / SLIP_STEPS), visuals=False)
+    scenario = _scenario(task, robot, 2 * duration, command, time_step=duration / SLIP_STEPS)
+    station = Station(scenario, visuals=False, slip=True)
     simulator = Simulator(station)
     follow_rollers(simulator)
     simulator.AdvanceTo(duration)
-    monitor = station.GetSubsystemByName("slip_monitor")
-    context = monitor.GetMyContextFromRoot(simulator.get_context())
-    slip, loads = (monitor.GetOutputPort(name).Eval(context) for name in ("slip_speeds", "normal_forces"))
+    context = simulator.get_context()
+    slip, loads = (station.GetOutputPort(name).Eval(context) for name in ("slip_speeds", "normal_forces"))
     carrying = loads[supporting_wheels(robot)]
     return bool(np.max(slip) > SLIPPING * acceleration * duration or np.min(carrying) < LIFTED * np.mean(carrying))
 
