@@ -155,6 +155,8 @@ def analyze(
     from rollerbench import studies
     from rollerbench.report.analysis import analysis_table
 
+    if simulate and roll_resistance >= 1:
+        raise RollerbenchError(f"--roll-resistance {roll_resistance:g}: accepted with --simulate: less than 1")
     if simulate:
         from rollerbench.studies.measured_limits import measure_limits
     with _progress(robot, 0.0, unit="steps") as show:

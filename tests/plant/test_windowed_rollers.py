@@ -268,6 +268,41 @@ def test_a_saved_state_goes_on_bit_for_bit() -> None:
     assert (drive.plant.GetPositionsAndVelocities(drive.context) == end).all()
 
 
+def test_an_episode_starts_again_from_time_zero() -> None:
+    """Rollers that are remembered from later times are not run backwards."""
+    drive = Drive(mecanum(12))
+    ends = []
+    for _ in range(2):
+        root = drive.simulator.get_mutable_context()
+        root.SetTime(0.0)
+        still = np.r_[drive.plant.GetDefaultPositions(), np.zeros(drive.plant.num_velocities())]
+        drive.plant.SetPositionsAndVelocities(drive.context, still)
+        drive.drive(0, [0.0, 0.3, 0.0])
+        drive.simulator.Initialize()
+        drive.simulator.AdvanceTo(1.5)
+        ends.append(drive.q_xyt())
+    assert ends[0] == pytest.approx(ends[1], abs=1e-5)
+
+
+def test_a_robot_on_a_test_stand_turns_its_wheels() -> None:
+    from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlantConfig
+    from pydrake.systems.analysis import Simulator
+    from pydrake.systems.framework import DiagramBuilder
+
+    builder = DiagramBuilder()
+    plant, _ = AddMultibodyPlant(MultibodyPlantConfig(time_step=0.005), builder)
+    model = rb.add_robot(plant, mecanum(12), roller_model="windowed", builder=builder)
+    plant.WeldFrames(plant.world_frame(), model.body.body_frame())
+    plant.Finalize()
+    simulator = Simulator(builder.Build())
+    rb.follow_rollers(simulator)
+    context = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
+    port = plant.get_desired_state_input_port(model.model_instance)
+    port.FixValue(context, model.desired_state_matrix() @ np.full(4, 5.0))
+    simulator.AdvanceTo(1.0)
+    assert model.drive_joint(model.robot.wheels[0]).get_angle(context) == pytest.approx(5.0, rel=0.01)
+
+
 def test_one_call_follows_all_robots_in_a_diagram() -> None:
     pair = Drive(mecanum(12), robots.kiwi())
     pair.drive(0, [0.3, 0.0, 0.0], (0.0, 2.0, 0.0))
@@ -317,7 +352,7 @@ def test_refused_with_what_is_accepted() -> None:
         rb.add_robot(MultibodyPlant(0.005), "youbot_base", roller_model="windowed")
     with pytest.raises(rb.SimulationError, match="positive time step"):
         rb.add_robot(MultibodyPlant(0.0), "youbot_base", roller_model="windowed", builder=DiagramBuilder())
-    with pytest.raises(rb.SimulationError, match="window_size = 1: accepted: 2 or more"):
+    with pytest.raises(rb.SimulationError, match="window_size = 1: accepted: a whole number, 2 or more"):
         rb.add_robot(
             MultibodyPlant(0.005), "youbot_base", roller_model="windowed", builder=DiagramBuilder(), window_size=1
         )

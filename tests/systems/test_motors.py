@@ -48,7 +48,7 @@ def test_the_controller_is_its_difference_equation(commands: list[float], limit:
         wanted = kp * (command - speed) + integral - kd * (speed - before) / dt
         torque = min(limit, max(-limit, wanted))
         expected.append(torque)
-        integral += dt * ki * (command - speed + (torque - wanted) / kp)
+        integral += dt * ki * (command - speed) + min(1.0, dt * ki / kp) * (torque - wanted)
         before = speed
     found = torques(controller, commands, speeds, dt)
     assert found == pytest.approx(expected, abs=1e-12)
@@ -62,6 +62,10 @@ def test_the_integral_does_not_wind_up() -> None:
     found = torques(WheelSpeedController(cart(2.0), 0.01, gains), commands, speeds, 0.01)
     assert found[49] == 2.0
     assert found[51] == -2.0
+    # Also where the tracking time kp / ki is shorter than a step.
+    hard = torques(WheelSpeedController(cart(2.0), 0.01, [PidGains(kp=0.01, ki=50.0)] * 2), commands, speeds, 0.01)
+    assert hard[49] == 2.0
+    assert hard[52] == -2.0
 
 
 @pytest.mark.parametrize("name", ["youbot_base", "mecanum_platform", "differential_cart", "kiwi"])
@@ -143,6 +147,21 @@ def test_rolling_resistance_slows_a_coasting_cart_by_its_share_of_the_weight() -
     assert dynamics.mass_matrix[0, 0] > dynamics.kinematics.robot.mass
 
 
+@pytest.mark.parametrize("roll_resistance", [0.02, 0.3])
+def test_rolling_resistance_does_not_shake_a_robot_at_rest(roll_resistance: float) -> None:
+    """A push that is far too weak: wheels and rollers, light as they are, stay at rest."""
+    scenario = {
+        "name": "rest",
+        "robot": "youbot_base",
+        "duration": 0.5,
+        "command": {"type": "wheel_efforts", "wheel_efforts": {"front_left": 0.001}},
+        "ground": {"roll_resistance": roll_resistance},
+    }
+    recording = rb.run(scenario, save=False).recording
+    assert np.abs(recording.wheels("speed")[50:]).max() < 0.02
+    assert np.abs(recording.reference_v_xyw_B).max() < 0.01
+
+
 def test_slip_monitor_names_the_wheel_that_slides() -> None:
     from pydrake.systems.analysis import Simulator
 
@@ -171,6 +190,9 @@ def test_bad_commands_of_torques_are_refused() -> None:
     ):
         with pytest.raises(rb.DescriptionError, match=words):
             rb.load_scenario({**base, "command": {"type": "wheel_efforts", "wheel_efforts": command}})
+    slope = {"command": {"type": "wheel_efforts", "wheel_efforts": {}}, "ground": {"slope_deg": 5.0}}
+    with pytest.raises(rb.DescriptionError, match=r"ground.slope_deg = 5.*level ground only"):
+        rb.load_scenario({**base, **slope})
     pid = {"command": {"type": "twist", "v_xyw_B": [0.1, 0, 0]}, "controller": {"pid": {"kp": 1.0}}}
     with pytest.raises(rb.DescriptionError, match=r"controller.pid.*accepted: with servo: pid"):
         rb.load_scenario({**base, **pid})

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rollerbench.description.mass import axle_inertia, roller_inertia
 from rollerbench.description.wheels import RollerWheel
+from rollerbench.errors import KinematicsError
 from rollerbench.kinematics.limits import wheel_loads
 from rollerbench.kinematics.mobility import null_space
 from rollerbench.kinematics.profile import Profile
@@ -62,22 +63,23 @@ class RollingDynamics:
             matrix += mass * at_castor.T @ at_castor
         return matrix
 
-    def acceleration(self, v_xyw_B: ArrayLike, wheel_efforts: ArrayLike) -> Array:
+    def acceleration(self, v_xyw_B: ArrayLike, wheel_efforts: ArrayLike, slow: float = SLOW) -> Array:
         """Rate of the twist (..., 3) [m/s2, m/s2, rad/s2] under torques (..., n_driven) at the wheels [N m].
 
         Args:
             v_xyw_B: Feasible twists (..., 3) [m/s, m/s, rad/s].
             wheel_efforts: Torques [N m], positive where they drive forward.
+            slow: Speed below which rolling resistance falls off [m/s].
         """
         v, efforts = np.asarray(v_xyw_B, np.float64), np.asarray(wheel_efforts, np.float64)
         px, py = np.moveaxis(v @ self._body[:2].T, -1, 0)
         w = v[..., 2]
         bias = np.stack([-w * py, w * px, v[..., 0] * py - v[..., 1] * px], axis=-1)
         rows, _, drags = self._rolling
-        drag = (drags * np.tanh(v @ rows.T / SLOW)) @ rows
+        drag = (drags * np.tanh(v @ rows.T / slow)) @ rows
         for (x, y), _, size in self._castors:
             vx, vy = v[..., 0] - w * y, v[..., 1] + w * x
-            share = size * np.tanh(np.hypot(vx, vy) / SLOW) / np.maximum(np.hypot(vx, vy), np.finfo(float).tiny)
+            share = size * np.tanh(np.hypot(vx, vy) / slow) / np.maximum(np.hypot(vx, vy), np.finfo(float).tiny)
             drag = drag + np.stack([share * vx, share * vy, share * (x * vy - y * vx)], axis=-1)
         force = efforts @ self.kinematics.drive_matrix - drag - v @ self._damping - bias
         free = self._free
@@ -85,19 +87,34 @@ class RollingDynamics:
         return rates
 
     def twist(self, wheel_efforts: Profile, duration: float, time_step: float) -> Profile:
-        """The twist (3) over time that torques (n_driven) over time lead to from rest, by the Runge-Kutta method."""
+        """The twist (3) over time that torques (n_driven) over time lead to from rest, by the Runge-Kutta method.
+
+        Rolling resistance falls off as far from rest as the time step needs for a stable integration.
+
+        Raises:
+            KinematicsError: the torques spin the base so fast that the time step cannot follow.
+        """
+        rows, _, drags = self._rolling
+        rates = np.linalg.eigvals(np.linalg.inv(self.mass_matrix) @ rows.T @ (drags[:, np.newaxis] * rows))
+        slow = max(SLOW, 0.5 * time_step * float(np.max(rates.real, initial=0.0)))
         times = np.linspace(0.0, duration, max(2, math.ceil(duration / time_step) + 1))
         values = np.zeros((len(times), 3))
         slopes = np.zeros_like(values)
         efforts, between = wheel_efforts(times), wheel_efforts(0.5 * (times[1:] + times[:-1]))
-        slopes[0] = self.acceleration(values[0], efforts[0])
-        for k, h in enumerate(np.diff(times)):
-            k1 = slopes[k]
-            k2 = self.acceleration(values[k] + 0.5 * h * k1, between[k])
-            k3 = self.acceleration(values[k] + 0.5 * h * k2, between[k])
-            k4 = self.acceleration(values[k] + h * k3, efforts[k + 1])
-            values[k + 1] = values[k] + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-            slopes[k + 1] = self.acceleration(values[k + 1], efforts[k + 1])
+        slopes[0] = self.acceleration(values[0], efforts[0], slow)
+        with np.errstate(over="ignore", invalid="ignore"):
+            for k, h in enumerate(np.diff(times)):
+                k1 = slopes[k]
+                k2 = self.acceleration(values[k] + 0.5 * h * k1, between[k], slow)
+                k3 = self.acceleration(values[k] + 0.5 * h * k2, between[k], slow)
+                k4 = self.acceleration(values[k] + h * k3, efforts[k + 1], slow)
+                values[k + 1] = values[k] + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+                slopes[k + 1] = self.acceleration(values[k + 1], efforts[k + 1], slow)
+        if not (np.isfinite(values).all() and np.isfinite(slopes).all()):
+            raise KinematicsError(
+                f"{self.kinematics.robot.name}: the torques spin the base faster than steps of {time_step:g} s can "
+                "follow; accepted: smaller torques, a shorter duration, or a smaller plant.time_step"
+            )
         return Profile(breaks=times, values=values, slopes=slopes)
 
     @cached_property

@@ -200,6 +200,8 @@ def add_robot(
         SimulationError: windowed rollers without a builder, or in a plant with continuous time.
     """
     robot = load_robot(robot)
+    if roller_model not in ("full", "windowed"):
+        raise SimulationError(f"add_robot: roller_model = {roller_model!r}: accepted: 'full', 'windowed'")
     windows = _windows(robot, plant, builder, window_size) if roller_model == "windowed" else {}
     parser = Parser(plant)
     parser.SetAutoRenaming(True)
@@ -240,8 +242,8 @@ def _windows(
             "add_robot: windowed rollers are for discrete plants; accepted: a positive time step, or "
             "roller_model='full'"
         )
-    if window_size < 2:
-        raise SimulationError(f"add_robot: window_size = {window_size}: accepted: 2 or more")
+    if not isinstance(window_size, int) or window_size < 2:
+        raise SimulationError(f"add_robot: window_size = {window_size}: accepted: a whole number, 2 or more")
     return windows(robot, window_size)
 
 

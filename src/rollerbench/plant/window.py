@@ -147,7 +147,9 @@ class RollerWindow(LeafSystem):
         return EventStatus.Succeeded()
 
     def _require_follower(self, context: Context) -> EventStatus:
-        if context.get_time() - context.get_discrete_state_vector().GetAtIndex(0) > 0.99 * self._period:
+        # Before the plant's first step, which is at time 0, there is nothing to follow.
+        now = context.get_time()
+        if now > 0 and now - max(0.0, context.get_discrete_state_vector().GetAtIndex(0)) > 0.99 * self._period:
             raise SimulationError(
                 f"{self._robot}: only the rollers near the ground are simulated, and nothing changes them as the "
                 "wheels turn: call rollerbench.follow_rollers(simulator) before the simulation, or use "
@@ -176,7 +178,9 @@ class _Follower:
         self.per_pitch, self.middle, self.within = 1 / ring.pitch, 0.0, 0.5 * wheel.window.size
         self._count, self._first = ring.count, 0
         self._drive, self._wheel_speed = wheel.drive, int(wheel.drive.velocity_start())
-        self._yaw_rate = int(wheel.body.floating_velocities_start_in_v()) + 2
+        # A body on a test stand does not turn.
+        floats = wheel.body.is_floating_base_body()
+        self._yaw_rate = int(wheel.body.floating_velocities_start_in_v()) + 2 if floats else None
         self._hub: RigidBody = wheel.drive.child_body()
         self._slots, self._slot_speeds = wheel.slots, [int(joint.velocity_start()) for joint in wheel.slots]
         self._frames: list[FixedOffsetFrame] = [joint.frame_on_parent() for joint in wheel.slots]
@@ -195,7 +199,8 @@ class _Follower:
         """Moves the window to the bottom; the state (see `RollerWindow`) is changed."""
         window, size, count = self._window, self._window.size, self._count
         before, first = self._first, window.first_at(angle)
-        motion = angle, velocities.item(self._wheel_speed), velocities.item(self._yaw_rate)
+        yaw_rate = 0.0 if self._yaw_rate is None else velocities.item(self._yaw_rate)
+        motion = angle, velocities.item(self._wheel_speed), yaw_rate
         spins, times = self._offset + 1, self._offset + 1 + count
         for m in range(before, before + size):
             if not first <= m < first + size:

@@ -55,7 +55,7 @@ def limit_figures(found: Capability, measured: Measured | None = None) -> dict[s
         figures["acceleration"] = acceleration(found, points.get("acceleration"))
     if not found.few and any(limit.feasible.any() for limit in (found.speed, found.accelerations["best"])):
         figures["limiting_wheels"] = limiting_wheels(found)
-    if np.isfinite(found.efforts).any():
+    if np.isfinite(found.efforts).any() and len(found.map_accelerations) > 1:
         figures["efforts"] = efforts(found, points.get("efforts"))
         if not found.few:
             figures["effort_map"] = effort_map(found)

@@ -82,12 +82,13 @@ class Window:
 
         Args:
             spin: Angular velocity with which it left, a float or an array [rad/s].
-            elapsed: The time since, likewise [s].
+            elapsed: The time since, likewise [s]; negative if time was set back meanwhile, which counts as none.
             wheel_speed: Speed of the wheel about its axle, likewise [rad/s].
         """
-        exp = np.exp if isinstance(elapsed, np.ndarray) else math.exp
         mean = self.cos_sin[0] * wheel_speed
-        return mean + (spin - mean) * exp(-self.decay_rate * elapsed)
+        if isinstance(elapsed, np.ndarray):
+            return mean + (spin - mean) * np.exp(-self.decay_rate * np.maximum(elapsed, 0.0))
+        return mean + (spin - mean) * math.exp(-self.decay_rate * max(elapsed, 0.0))
 
     @cached_property
     def decay_rate(self) -> float:

@@ -98,7 +98,8 @@ class Ground(Part):
     Attributes:
         friction: Coefficient of friction; with a wheel's it combines to 2ab/(a+b).
         slope_deg: Inclination; the world's x axis points uphill.
-        roll_resistance: Rolling resistance over load, of wheels and of rollers along the ground.
+        roll_resistance: Rolling resistance over load, of wheels and of rollers along the ground. It falls off near
+            rest, so it slows a robot on a slope but does not hold it.
     """
 
     friction: Positive = 0.8
@@ -185,6 +186,9 @@ class Scenario(Part):
         problems += self.errors.problems(self.robot)
         if self.controller.pid is not None and self.controller.servo != "pid":
             problems.append(Problem(("controller", "pid"), "gains without their controller; accepted: with servo: pid"))
+        if isinstance(self.command, WheelEffortsCommand) and self.ground.slope_deg:
+            message = "torques have a reference on level ground only; accepted: 0, or another command"
+            problems.append(Problem(("ground", "slope_deg"), message, self.ground.slope_deg))
         if isinstance(self.command, WheelEffortsCommand) and self.errors.drives(self.robot) is not None:
             message = (
                 "torques do not go through a drivetrain; accepted: without gear_error, backlash_deg, encoder_counts"

@@ -79,10 +79,7 @@ def measure_limits(
     Returns:
         "speed": speeds with a wheel at its limit [m/s]; "acceleration": those at which a wheel begins to slide or lifts
         off under the efforts of `limits.wheel_efforts`, whatever its motors can do [m/s2]; "efforts": those of the
-        wheels' servos at the reference acceleration of found [N m].
-
-    Raises:
-        SimulationError: a simulation failed.
+        wheels' servos at the reference acceleration of found [N m]. NaN where a simulation failed.
     """
     few = found.directions[found.goes & (found.directions < 2 * np.pi - 1e-9)]
     directions = np.radians(np.arange(0.0, 360.0, DIRECTION_STEP_DEG)) if found.all_round else few
@@ -115,7 +112,16 @@ def measure_limits(
 
 
 def _measure(task: _Task) -> tuple[float, float, Array]:
-    return _speed(task), _slip_onset(task), _efforts(task)
+    """Speed, acceleration and efforts; NaN where the robot tips over or leaves the ground."""
+
+    def or_nan(measure: Callable[[_Task], Any], nothing: Any) -> Any:
+        try:
+            return measure(task)
+        except SimulationError:
+            return nothing
+
+    none = np.full(len(task.robot.driven_wheels), np.nan)
+    return or_nan(_speed, math.nan), or_nan(_slip_onset, math.nan), or_nan(_efforts, none)
 
 
 def _speed(task: _Task) -> float:

@@ -9,7 +9,10 @@ from pydrake.multibody.plant import ContactResults, PointPairContactInfo
 from pydrake.multibody.tree import RevoluteJoint
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, EventStatus, LeafSystem
 
+from rollerbench.description.inertia import GRAVITY
+from rollerbench.description.mass import axle_inertia
 from rollerbench.errors import SimulationError
+from rollerbench.kinematics.limits import wheel_loads
 from rollerbench.plant import RobotModel
 
 STEPS_TO_STOP = 4.0
@@ -86,10 +89,8 @@ class RollResistance(LeafSystem):
         if not (math.isfinite(coefficient) and coefficient >= 0):
             raise SimulationError(f"coefficient = {coefficient}: accepted: 0 or more")
         plant = model.plant
-        self._rolling = _rolling_of_body(model)
-        gravity = float(np.linalg.norm(plant.gravity_field().gravity_vector()))
+        self._rolling = _rolling_of_body(model, coefficient)
         self._f = coefficient
-        self._slow = max(1e-4, STEPS_TO_STOP * coefficient * gravity * plant.time_step())
         self._contacts = self.DeclareAbstractInputPort("contact_results", Value(ContactResults()))
         self._poses = self.DeclareAbstractInputPort("body_poses", Value[list[RigidTransform]]())
         self._velocities = self.DeclareVectorInputPort("velocities", plant.num_velocities())
@@ -104,10 +105,10 @@ class RollResistance(LeafSystem):
             info = contacts.point_pair_contact_info(number)
             drag = self._f * _normal_force(info)
             for body in (int(info.bodyA_index()), int(info.bodyB_index())):
-                for index, link, axis in self._rolling.get(body, ()):
+                for index, link, axis, slow in self._rolling.get(body, ()):
                     arm = poses[link].inverse().multiply(info.contact_point())
                     lever = math.hypot(arm[axis - 1], arm[axis - 2])
-                    force[index] -= drag * lever * math.tanh(lever * velocities[index] / self._slow)
+                    force[index] -= drag * lever * math.tanh(lever * velocities[index] / slow)
         state.get_mutable_vector(0).SetFromVector(force)
         return EventStatus.Succeeded()
 
@@ -121,18 +122,25 @@ def _wheel_of_body(model: RobotModel) -> dict[int, int]:
     return found
 
 
-def _rolling_of_body(model: RobotModel) -> dict[int, list[tuple[int, int, int]]]:
-    """What rolls where a body touches: index in the velocities, the link, and which of its axes it turns about."""
+def _rolling_of_body(model: RobotModel, coefficient: float) -> dict[int, list[tuple[int, int, int, float]]]:
+    """What rolls where a body touches: index in the velocities, link, axis that it turns about, and width of the tanh.
 
-    def rolling(joint: RevoluteJoint, axis: int) -> tuple[int, int, int]:
-        return int(joint.velocity_start()), int(joint.child_body().index()), axis
+    The torques are explicit. So that they bring to rest, and do not shake, neither the whole robot nor a single wheel,
+    which is light, a step takes away no more than a part of the speed: f g dt, and f N R^2 dt / J_wheel.
+    """
+
+    def rolling(joint: RevoluteJoint, axis: int, slow: float) -> tuple[int, int, int, float]:
+        return int(joint.velocity_start()), int(joint.child_body().index()), axis, slow
 
     found = {}
-    for wheel in model.robot.wheels:
-        drive = rolling(model.drive_joint(wheel), AXLE)
+    impulse = coefficient * model.plant.time_step()
+    for wheel, load in zip(model.robot.wheels, wheel_loads(model.robot, 0.0, 0.0), strict=True):
+        single = impulse * max(0.0, float(load)) * wheel.radius**2 / axle_inertia(wheel)
+        slow = max(1e-4, STEPS_TO_STOP * impulse * GRAVITY, single)
+        drive = rolling(model.drive_joint(wheel), AXLE, slow)
         found[drive[1]] = [drive]
         for joint in model.roller_joints(wheel):
-            roller = rolling(joint, ROLLER_AXIS)
+            roller = rolling(joint, ROLLER_AXIS, slow)
             found[roller[1]] = [drive, roller]
     return found
 

@@ -1,15 +1,17 @@
 """A motor controller as a Drake System: torques from the errors of wheel speeds."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 from pydrake import symbolic
 from pydrake.symbolic import Expression, Variable
 from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.primitives import Multiplexer, SymbolicVectorSystem
 
-from rollerbench.description import Robot
+from rollerbench.description import Robot, load_robot
 from rollerbench.description.mass import axle_inertia
 from rollerbench.errors import KinematicsError
 
@@ -62,10 +64,10 @@ class WheelSpeedController(Diagram):
 
         wanted = kp e + i - kd (speed - speed before) / dt
         torque = clip(wanted, -max_effort, max_effort)
-        i_next = i + dt ki (e + (torque - wanted) / kp)
+        i_next = i + dt ki e + min(1, dt ki / kp) (torque - wanted)
 
-    so the integral i [N m] does not grow against a limit (back-calculation with the tracking time kp / ki). The rate of
-    the speed, not that of the error, is damped: a step of the command gives no kick.
+    so the integral i [N m] does not grow against a limit (back-calculation with the tracking time kp / ki, dt at least)
+    and damping the rate of the speed, not that of the error, gives no kick at a step of the command.
 
     Input ports:
         wheel_speed_command (n_driven): in the order of robot.yaml [rad/s].
@@ -76,11 +78,16 @@ class WheelSpeedController(Diagram):
     Source: Astrom and Haegglund (2006), Advanced PID control, sections 3.4 and 3.5.
     """
 
-    def __init__(self, robot: Robot, time_step: float, gains: Sequence[PidGains] | None = None) -> None:
+    def __init__(
+        self,
+        robot: Robot | str | Path | Mapping[str, Any],
+        time_step: float,
+        gains: Sequence[PidGains] | None = None,
+    ) -> None:
         """Builds the diagram.
 
         Args:
-            robot: The robot.
+            robot: Robot, name of a shipped one, or path to a robot.yaml.
             time_step: Period of the updates: the plant's [s].
             gains: Gains (n_driven); by default those of `wheel_speed_gains`.
 
@@ -91,6 +98,7 @@ class WheelSpeedController(Diagram):
         super().__init__()
         if not (math.isfinite(time_step) and time_step > 0):
             raise KinematicsError(f"time_step = {time_step}: accepted: a positive number of seconds")
+        robot = load_robot(robot)
         wheels = robot.driven_wheels
         gains = wheel_speed_gains(robot, time_step) if gains is None else list(gains)
         if not wheels or len(gains) != len(wheels):
@@ -124,8 +132,8 @@ def _pid(gains: Sequence[PidGains], limits: Sequence[float | None], time_step: f
         wanted = gain.kp * error + integral - gain.kd * (speed - last) / time_step
         torque = wanted if limit is None else symbolic.max(symbolic.min(wanted, limit), -limit)
         torques.append(torque)
-        excess = 0.0 if limit is None or not gain.kp else (torque - wanted) / gain.kp
-        steps.append(integral + time_step * gain.ki * (error + excess))
+        back = min(1.0, time_step * gain.ki / gain.kp) if gain.kp else 0.0
+        steps.append(integral + time_step * gain.ki * error + back * (torque - wanted))
     return SymbolicVectorSystem(
         state=[*integrals, *before],
         input=[*commands, *speeds],
