@@ -405,3 +405,12 @@ def test_bad_accelerations_are_refused(bad: Any) -> None:
     for function in (rb.limits.wheel_efforts, rb.limits.wheel_loads):
         with pytest.raises(rb.KinematicsError, match="acceleration"):
             function(ROBOTS["kiwi"], 0.0, bad)
+
+
+def test_slippery_ground_is_no_lift_off() -> None:
+    for friction in (0.001, 0.01, 0.1):
+        limit = rb.limits.max_acceleration("mecanum_platform", 0.0, ground_friction=friction)
+        assert str(limit.cause) == "adhesion"
+    kept = rb.limits.max_acceleration("mecanum_platform", 0.0, ground_friction=0.001, loads=[490.5] * 4)
+    assert str(kept.cause) == "adhesion"
+    assert str(rb.limits.max_acceleration("differential_cart", 0.0).cause) == "lift-off"

@@ -16,8 +16,8 @@ from rollerbench.kinematics.limits.result import Limit, finite_number, unit_vect
 
 Array = NDArray[np.float64]
 
-LIFTED = 0.02
-"""A wheel at its limit with less friction than this part of an even share of the weight has lost its load [-]."""
+LIFTED = 0.025
+"""A wheel at its limit with less load than this part of an even share of the weight has lost it [-]."""
 
 AT_LIMIT = 1e-6
 """How close to its limit a wheel counts as being at it, over its share of the weight or over its max_effort [-]."""
@@ -75,6 +75,8 @@ def max_acceleration(
     value, cause, at_limit = _solve(
         Affine(constant=x.constant[chosen], slope=x.slope[chosen]),
         Cones(constant=cones.constant[chosen], slope=cones.slope[chosen]),
+        # Given loads are not lost.
+        np.where((kinds == "adhesion") & (loads is None), friction[owners], 0.0),
     )
     values, causes = np.full(len(u), np.nan), np.full(len(u), "drive", dtype="<U9")
     at_limits = model.skids.copy()
@@ -91,10 +93,11 @@ def max_acceleration(
     )
 
 
-def _solve(x: Affine, cones: Cones) -> tuple[Array, NDArray[np.intp], NDArray[np.bool_]]:
+def _solve(x: Affine, cones: Cones, friction: Array) -> tuple[Array, NDArray[np.intp], NDArray[np.bool_]]:
     """Largest x_0 (p,) of the x(z) in the cones; which (p,) of these sets it, -1 for lost load; which (p, m) are tight.
 
-    Where there is none: NaN, and the cones that are violated most.
+    Where there is none: NaN, and the cones that are violated most. The cones (m,) of loads that may be lost carry these
+    times their friction, the others 0.
     """
     reduced = Cones(constant=cones.at(x.constant), slope=np.einsum("pmix,pxk->pmik", cones.slope, x.slope))
     z, feasible = maximize(x.slope[:, 0] / GRAVITY, reduced)
@@ -103,7 +106,7 @@ def _solve(x: Affine, cones: Cones) -> tuple[Array, NDArray[np.intp], NDArray[np
     least = rest.min(axis=1, initial=1.0, keepdims=True)
     tight = rest <= np.maximum(least, np.where(feasible, 0.0, -np.inf)[:, np.newaxis]) + AT_LIMIT
     best = x.constant[:, 0] + np.einsum("pk,pk->p", x.slope[:, 0], z)
-    lost = (tight & (w[..., 0] < LIFTED)).any(axis=1)
+    lost = (tight & (w[..., 0] < LIFTED * friction)).any(axis=1)
     return np.where(feasible & (best >= 0.0), best, np.nan), np.where(lost, -1, np.argmin(rest, axis=1)), tight
 
 
