@@ -79,7 +79,8 @@ def measure_limits(
     Returns:
         "speed": speeds with a wheel at its limit [m/s]; "acceleration": those at which a wheel begins to slide or lifts
         off under the efforts of `limits.wheel_efforts`, whatever its motors can do [m/s2]; "efforts": those of the
-        wheels' servos at the reference acceleration of found [N m]. NaN where a simulation failed.
+        wheels' servos at the reference acceleration of found [N m]. NaN where a simulation failed, or no wheel slid at
+        four times the acceleration of theory.
     """
     few = found.directions[found.goes & (found.directions < 2 * np.pi - 1e-9)]
     directions = np.radians(np.arange(0.0, 360.0, DIRECTION_STEP_DEG)) if found.all_round else few
@@ -158,6 +159,8 @@ def _slip_onset(task: _Task) -> float:
         low = 0.0
     if not _gives_way(task, robot, high):
         high = 4.0 * wanted
+        if not _gives_way(task, robot, high):
+            return math.nan
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
         low, high = (low, middle) if _gives_way(task, robot, middle) else (middle, high)

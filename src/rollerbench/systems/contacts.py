@@ -18,7 +18,6 @@ from rollerbench.plant import RobotModel
 STEPS_TO_STOP = 4.0
 """Rolling resistance falls off below the speed that it could take away in so many steps [-]."""
 
-
 AXLE, ROLLER_AXIS = 1, 0
 """About which of its axes a hub, and a roller, turns."""
 
