@@ -2,6 +2,7 @@
 
 from rollerbench.description.body import Body
 from rollerbench.description.files import load_robot
+from rollerbench.description.legs import FootWheel, Leg, Link, Posture
 from rollerbench.description.robot import Robot
 from rollerbench.description.wheels import (
     AnyWheel,
@@ -20,8 +21,12 @@ __all__ = [
     "Body",
     "CastorWheel",
     "FixedWheel",
+    "FootWheel",
+    "Leg",
+    "Link",
     "MecanumWheel",
     "OmniWheel",
+    "Posture",
     "Robot",
     "RollerWheel",
     "Rollers",

@@ -52,6 +52,18 @@ def solid_cylinder(mass: float, radius: float, length: float) -> RigidInertia:
     return at_origin(mass, (across, 0.5 * mass * radius**2, across))
 
 
+def solid_rod(mass: float, radius: float, length: float) -> RigidInertia:
+    """Homogeneous cylinder about the z axis [m]."""
+    across = mass * (3 * radius**2 + length**2) / 12
+    return at_origin(mass, (across, across, 0.5 * mass * radius**2))
+
+
+def solid_ball(mass: float, radius: float) -> RigidInertia:
+    """Homogeneous ball [m]."""
+    moment = 0.4 * mass * radius**2
+    return at_origin(mass, (moment, moment, moment))
+
+
 def barrel_volume(semi_axis: float, radius: float, half_length: float) -> float:
     """Volume [m3] of an ellipsoid (semi_axis, radius, radius) cut at +-half_length along its long axis."""
     return 2 * np.pi * radius**2 * half_length * (1 - (half_length / semi_axis) ** 2 / 3)
