@@ -46,7 +46,7 @@ REFUSALS = [
     (["body", "center_of_mass"], [0.5, 0, 0], ["body.center_of_mass = (0.5, 0.0, 0.0)", "tips over", "outside"]),
     (["body", "center"], [0, 0, -0.05], ["body.size", "into the ground"]),
     (["body", "inertia"], [1, 2, 4], ["inertia", "largest moment"]),
-    (["wheels"], [], ["wheels = []", "at least 1"]),
+    (["wheels"], [], ["wheels", "required", "legs instead of it"]),
     (["legs"], [{}], ["legs"]),
 ]
 

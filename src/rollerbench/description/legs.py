@@ -1,7 +1,6 @@
 """Wheel-legs: chains of revolute joints in standard Denavit-Hartenberg rows, with a wheel at the foot."""
 
 import math
-from functools import cached_property
 from typing import Annotated, Literal, Self
 
 import numpy as np
@@ -138,18 +137,18 @@ class Leg(Part):
         """Length of the outstretched leg from the hip to the wheel's centre [m], an upper bound."""
         return float(sum(math.hypot(link.a, link.d) for link in self.links))
 
-    @cached_property
+    @property
     def rows(self) -> Array:
         """Denavit-Hartenberg rows (n_joints, 4): a [m], alpha [rad], d [m], offset of theta [rad]."""
         table = [(row.a, math.radians(row.alpha_deg), row.d, math.radians(row.theta_offset_deg)) for row in self.links]
         return np.array(table)
 
-    @cached_property
+    @property
     def limits(self) -> Array:
         """Least and largest joint angles (2, n_joints) [rad]."""
         return np.radians([[link.min_deg for link in self.links], [link.max_deg for link in self.links]])
 
-    @cached_property
+    @property
     def X_BL(self) -> Array:
         """Pose (4, 4) of the leg's base in the body."""
         pose = np.eye(4)

@@ -157,9 +157,8 @@ def _leg_problems(robot: Robot) -> Iterator[Problem]:
             if posture.name not in leg.postures:
                 message = f"no angles for the posture {posture.name}; accepted: angles for every posture"
                 yield Problem(("legs", index, "postures"), message, tuple(leg.postures))
-            needed = 3 if posture.hold == "tibia" else 1 + (posture.held_joint if posture.held_joint is not None else 0)
-            if posture.hold != "least" and (len(leg.links) != 4 or needed > 4):
-                message = f"leg {leg.name} has {len(leg.links)} joints; accepted: least, for other legs than those of 4"
+            if posture.hold != "least" and len(leg.links) != 4:
+                message = f"leg {leg.name} has {len(leg.links)} joints; accepted: least"
                 yield Problem(("postures", robot.standing.index(posture), "hold"), message, posture.hold)
 
 
@@ -188,8 +187,8 @@ def _support_problems(robot: Robot) -> Iterator[Problem]:
         lift = contact[2] - ground
         if lift > LIFT_TOLERANCE * radius:
             message = (
-                f"{'the foot of leg' if robot.legs else 'wheel'} {name} hangs {lift:.4g} m above the ground; accepted: a height within "
-                f"{LIFT_TOLERANCE * radius:.3g} m above {ground + radius:.4g}"
+                f"{'the foot of leg' if robot.legs else 'wheel'} {name} hangs {lift:.4g} m above the ground; "
+                f"accepted: a height within {LIFT_TOLERANCE * radius:.3g} m above {ground + radius:.4g}"
             )
             yield Problem((field, index, "postures" if robot.legs else "position"), message, place)
     bottom = robot.body.box_center[2] - 0.5 * robot.body.size[2]
