@@ -1,0 +1,147 @@
+"""What a robot's legs are about to do, for one moment; and what the plan is made from."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollerbench.description import Posture
+from rollerbench.kinematics.legs.changes import Change
+from rollerbench.kinematics.legs.gaits import Gait
+from rollerbench.kinematics.legs.group import Hold
+from rollerbench.kinematics.legs.smooth import Follower
+from rollerbench.kinematics.legs.wheeling import Wheeling
+
+Array = NDArray[np.float64]
+
+Activity = Literal["walk", "drive", "change", "halt"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LegMode:
+    """How a robot on legs follows its commands.
+
+    Attributes:
+        posture: Name of the posture.
+        motion: "walk", or "drive" on the feet's wheels.
+        gait: Name of the gait (`GAITS`), or a Gait of one's own.
+        change: How it gets to another posture: "stepping", or "rolling" with all wheels on the ground.
+    """
+
+    posture: str
+    motion: Literal["walk", "drive"] = "walk"
+    gait: str | Gait = "tripod"
+    change: Literal["stepping", "rolling"] = "stepping"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LegCommand:
+    """What a robot on legs is asked to do.
+
+    Attributes:
+        v_xyw_B: Body twist (3,) [m/s, m/s, rad/s].
+        offset: Pose (6,) of the body from where its posture has it: x, y, z [m], roll, pitch, yaw [rad].
+        mode: How.
+    """
+
+    v_xyw_B: Array
+    offset: Array
+    mode: LegMode
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LegFeedback:
+    """What a plan learns from those who follow it.
+
+    Attributes:
+        q: Joint angles (k, n) that the legs are at [rad].
+        roll_P: Displacements (k, 3) by which feet on the ground rolled sideways, as their legs leaned, since the last
+            plan, in P [m].
+        loads: Measured loads (k,) of the feet [N]; None where nobody measures, and the ground is taken to be level.
+        fault: What went wrong, in words; the robot then halts.
+    """
+
+    q: Array
+    roll_P: Array
+    loads: Array | None = None
+    fault: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LegPlan:
+    """Where body and feet shall be at a moment. Frame P is the plan's own world.
+
+    Attributes:
+        time: The moment [s].
+        q_xyt: Planar pose (3,) of B in P, without the offset [m, m, rad].
+        twist: Body twist (3,) [m/s, m/s, rad/s], and its rate.
+        offset: Offset (6,) of the body (see `LegCommand`), and its rate.
+        height: Height of Bo over the ground, without the offset [m].
+        ground: Mean height (1,) of the ground under the feet [m], and its rate.
+        feet_P: Lowest points (k, 3) of the feet's wheels [m].
+        swing: Progress (k,) of legs in the air, from 0 to 1; -1 on the ground.
+        lifted_P: Where legs in the air left the ground (k, 3) [m].
+        load: Shares (k,) of its load that a foot bears, from 0 in the air to 1.
+        phase: Where in its period the gait is, from 0 to 1.
+        gait: The gait.
+        posture: The posture that it stands in, or leaves.
+        hold: What settles the joints that the feet leave free.
+        activity: What the robot does.
+        request: The twist (3,) that was last asked for, and ...
+        accepted: ... the one (3,) within the legs' reach that was made of it.
+        change: The change of posture that is under way.
+        wheeling: What driving on wheels remembers.
+        status: What the robot could not do, in words; empty if nothing.
+    """
+
+    time: float
+    q_xyt: Array
+    twist: Follower
+    offset: Follower
+    height: float
+    ground: Follower
+    feet_P: Array
+    swing: Array
+    lifted_P: Array
+    load: Array
+    phase: float
+    gait: Gait
+    posture: Posture
+    hold: Hold
+    activity: Activity = "walk"
+    request: Array
+    accepted: Array
+    change: Change | None = None
+    wheeling: Wheeling | None = None
+    status: str = ""
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether the body does not move and all feet are on the ground."""
+        still = not (self.twist.value.any() or self.twist.rate.any())
+        return bool(still and (self.swing < 0).all())
+
+    @property
+    def X_PB(self) -> Array:
+        """Pose (4, 4) of the body in P."""
+        x, y, yaw = self.q_xyt
+        dx, dy, dz, roll, pitch, turn = self.offset.value
+        cos, sin = np.cos(yaw), np.sin(yaw)
+        pose = np.eye(4)
+        pose[:3, :3] = rotation(roll, pitch, yaw + turn)
+        pose[:3, 3] = (x + cos * dx - sin * dy, y + sin * dx + cos * dy, self.height + dz + self.ground.value[0])
+        return pose
+
+
+def rotation(roll: float, pitch: float, yaw: float) -> Array:
+    """Rotation (3, 3) by yaw about z after pitch about y after roll about x [rad]."""
+    cr, sr, cp, sp = np.cos(roll), np.sin(roll), np.cos(pitch), np.sin(pitch)
+    cy, sy = np.cos(yaw), np.sin(yaw)
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )

@@ -1,0 +1,96 @@
+"""Joint angles and wheel speeds that follow a plan of the feet."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from rollerbench.kinematics.legs.group import Hold, LegGroup
+
+Array = NDArray[np.float64]
+
+MISSED = 1e-3
+"""A foot that misses its target by more is out of reach [m]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Tracked:
+    """Where the legs are, and how they move until the next period.
+
+    Attributes:
+        q: Joint angles (k, n) now [rad].
+        wheel: Angles (k,) of the wheels now [rad].
+        q_rate: Mean joint speeds (k, n) until the next period [rad/s].
+        wheel_rate: Mean wheel speeds (k,) until then [rad/s].
+        roll_P: Displacements (k, 3) by which leaning rolls the feet sideways until then, in P [m].
+        fault: Why the legs stay where they are, in words; else empty.
+    """
+
+    q: Array
+    wheel: Array
+    q_rate: Array
+    wheel_rate: Array
+    roll_P: Array
+    fault: str = ""
+
+    def next(self, dt: float) -> tuple[Array, Array]:
+        """Joint angles (k, n) and wheel angles (k,) after the period dt [s]."""
+        return self.q + dt * self.q_rate, self.wheel + dt * self.wheel_rate
+
+
+def track(
+    group: LegGroup,
+    q: Array,
+    wheel: Array,
+    poses: tuple[Array, Array],
+    p_BF: Array,
+    hold: Hold,
+    stance: Array,
+    dt: float,
+) -> Tracked:
+    """Moves legs so that the feet reach their places in one period.
+
+    A target out of reach, or beyond a joint's limit, stops all legs where they are.
+
+    Args:
+        group: The legs.
+        q: Joint angles (k, n) now [rad].
+        wheel: Angles (k,) of the wheels now [rad].
+        poses: Poses (4, 4) of the body in P now and a period later.
+        p_BF: Places (k, 3) of the feet's centres a period later, in B [m].
+        hold: What settles the joints that the feet leave free, a period later.
+        stance: Which feet (k,) are on the ground, and roll; the other wheels stand still.
+        dt: The period [s].
+    """
+    still = np.zeros(len(q))
+    target, frames, missed = group.inverse(p_BF, hold, q)
+    fault = _fault(group, target, missed)
+    if fault:
+        return Tracked(q=q, wheel=wheel, q_rate=0 * q, wheel_rate=still, roll_P=np.zeros((len(q), 3)), fault=fault)
+    rate = (target - q) / dt
+    before, after = poses
+    turn = Rotation.from_matrix(before[:3, :3].T @ after[:3, :3]).as_rotvec() / dt
+    spin = turn + (group.jacobian(frames)[:, :3] @ rate[..., np.newaxis])[..., 0]
+    centers = p_BF @ after[:3, :3].T + after[:3, 3]
+    previous = group.frames(q)[:, -1, :3, 3] @ before[:3, :3].T + before[:3, 3]
+    velocity = (centers - previous) @ after[:3, :3] / dt
+    speed, across = group.rolling(frames, spin, velocity, after[2, :3])
+    roll = dt * across @ after[:3, :3].T * stance[:, np.newaxis]
+    return Tracked(q=q, wheel=wheel, q_rate=rate, wheel_rate=np.where(stance, speed, 0.0), roll_P=roll)
+
+
+def _fault(group: LegGroup, q: Array, missed: Array) -> str:
+    legs = group.robot.legs
+    if not np.isfinite(q).all() or missed.max() > MISSED:
+        worst = int(np.argmax(np.nan_to_num(missed, nan=np.inf)))
+        return f"the foot of leg {legs[worst].name} misses its place by {1e3 * missed[worst]:.3g} mm"
+    excess = group.beyond_limits(q)
+    if excess.any():
+        leg, joint = np.unravel_index(int(np.argmax(excess)), excess.shape)
+        link = legs[leg].links[joint]
+        return (
+            f"joint {joint + 1} of leg {legs[leg].name} would turn to {np.degrees(q[leg, joint]):.1f} deg; "
+            f"its limits are {link.min_deg:g} to {link.max_deg:g}"
+        )
+    return ""
