@@ -14,7 +14,6 @@ from pydrake.multibody.tree import (
     JointActuator,
     JointIndex,
     ModelInstanceIndex,
-    PdControllerGains,
     RevoluteJoint,
     RigidBody,
 )
@@ -22,6 +21,7 @@ from pydrake.systems.framework import Context, DiagramBuilder
 
 from rollerbench.description import AnyWheel, Leg, Robot, load_robot
 from rollerbench.errors import SimulationError
+from rollerbench.plant.servos import leg_and_wheel_joints, set_gains
 from rollerbench.plant.window import RollerWindow, WindowedWheel
 from rollerbench.sdf import names, robot_to_sdf
 from rollerbench.sdf.contact import static_penetration
@@ -70,7 +70,7 @@ class RobotModel:
 
     def leg_joints(self, leg: Leg) -> list[RevoluteJoint]:
         """The joints of a leg, from the hip on."""
-        return [self._joint(name) for name in _joint_names(leg)]
+        return [self._joint(name) for name in names.leg_joints(leg.name, len(leg.links))]
 
     def wheel_joint(self, leg: Leg) -> RevoluteJoint:
         """The joint about the axle of a foot's driven wheel."""
@@ -134,7 +134,7 @@ class RobotModel:
 
         Leg by leg, each leg's joints and then its wheel; 0 for a wheel that is locked.
         """
-        offset, joints = self.plant.num_positions(self.model_instance), _leg_and_wheel_joints(self.robot)
+        offset, joints = self.plant.num_positions(self.model_instance), leg_and_wheel_joints(self.robot)
         matrix = np.zeros((2 * len(joints), self.plant.num_multibody_states(self.model_instance)))
         for row, name in enumerate(joints):
             if name is not None:
@@ -144,12 +144,14 @@ class RobotModel:
 
     def leg_command_matrix(self) -> NDArray[np.float64]:
         """Matrix (2 n_actuators, 2 n) from desired [angles; rates] to the servo's [q; v], ordered like the state."""
-        return np.kron(np.eye(2), self.leg_effort_matrix())
+        efforts = self.leg_effort_matrix()
+        nothing = np.zeros_like(efforts)
+        return np.block([[efforts, nothing], [nothing, efforts]])
 
     def leg_effort_matrix(self) -> NDArray[np.float64]:
         """Matrix (n_actuators, n) from torques [N m], in the order of `leg_state_matrix`, to the actuation port."""
         row = {actuator.joint().name(): index for index, actuator in enumerate(self.actuators)}
-        joints = _leg_and_wheel_joints(self.robot)
+        joints = leg_and_wheel_joints(self.robot)
         matrix = np.zeros((len(row), len(joints)))
         for column, name in enumerate(joints):
             if name is not None:
@@ -263,39 +265,8 @@ def add_robot(
     for leg in robot.legs:
         for joint, angle in zip(model.leg_joints(leg), leg.posture(robot.standing[0].name), strict=True):
             joint.set_default_angle(angle)
-    _set_gains(model, gains or servo_gains(robot))
+    set_gains(plant, instance, robot, gains or servo_gains(robot))
     return model
-
-
-def _set_gains(model: RobotModel, gains: ServoGains) -> None:
-    pd: dict[str, tuple[float, float]] = {}
-    for wheel, damping in gains.drive_damping.items():
-        pd[names.drive_joint(wheel)] = (0.0, damping)
-    for wheel, stiffness in gains.steering_stiffness.items():
-        pd[names.swivel_joint(wheel)] = (stiffness, gains.steering_damping[wheel])
-    for leg in model.robot.legs:
-        if (of_leg := gains.legs.get(leg.name)) is not None:
-            pd |= dict.fromkeys(_joint_names(leg), (of_leg.stiffness, of_leg.damping))
-            pd[names.drive_joint(leg.name)] = (of_leg.wheel_stiffness, of_leg.wheel_damping)
-    plant = model.plant
-    for index in plant.GetJointActuatorIndices():
-        actuator = plant.get_joint_actuator(index)
-        name = actuator.joint().name()
-        if actuator.model_instance() == model.model_instance and name in pd:
-            p, d = pd[name]
-            actuator.set_controller_gains(PdControllerGains(p=p, d=d))
-
-
-def _joint_names(leg: Leg) -> list[str]:
-    return [names.leg_joint(leg.name, number) for number in range(1, len(leg.links) + 1)]
-
-
-def _leg_and_wheel_joints(robot: Robot) -> list[str | None]:
-    """Names of the legs' joints and wheels, leg by leg; None for a wheel that is locked."""
-    joints: list[str | None] = []
-    for leg in robot.legs:
-        joints += [*_joint_names(leg), names.drive_joint(leg.name) if leg.wheel.driven else None]
-    return joints
 
 
 def _standing_height(robot: Robot, posture: str | None = None) -> float:

@@ -1,9 +1,8 @@
 """Wheel-legs in an SDF model: a link for each joint, and the wheel at the foot."""
 
-import itertools
-
 import numpy as np
 from lxml import etree
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from rollerbench.description import Leg, Link, Robot
@@ -36,11 +35,10 @@ def add_legs(model: etree._Element, robot: Robot) -> None:
     are balls of the wheel's radius; links collide with nothing, so legs reach through each other and through steps.
     """
     for leg in robot.legs:
-        parent, frames = names.BODY, leg.frames_B(np.zeros(len(leg.links)))
-        frames_P = [frames[0], *(np.linalg.solve(first, then) for first, then in itertools.pairwise(frames))]
-        for number, (link, frame_P) in enumerate(zip(leg.links, frames_P, strict=False), start=1):
+        parent, steps = names.BODY, link_steps(leg)
+        for number, (link, step) in enumerate(zip(leg.links, steps, strict=False), start=1):
             element = add(model, "link", name=names.leg_link(leg.name, number))
-            add_pose(element, frame_P[:3, 3], Rotation.from_matrix(frame_P[:3, :3]), relative_to=parent)
+            add_pose(element, step[:3, 3], Rotation.from_matrix(step[:3, :3]), relative_to=parent)
             add_inertial(element, link.inertia)
             _add_link_visuals(element, link, LINK_COLORS[(number - 1) % len(LINK_COLORS)])
             add_joint(
@@ -56,8 +54,14 @@ def add_legs(model: etree._Element, robot: Robot) -> None:
             )
             parent = names.leg_link(leg.name, number)
         foot = add(model, "link", name=names.foot(leg.name))
-        add_pose(foot, frames_P[-1][:3, 3], Rotation.from_matrix(frames_P[-1][:3, :3]), relative_to=parent)
+        add_pose(foot, steps[-1][:3, 3], Rotation.from_matrix(steps[-1][:3, :3]), relative_to=parent)
         _add_foot(model, robot, leg, foot, parent)
+
+
+def link_steps(leg: Leg) -> NDArray[np.float64]:
+    """Poses (n_joints + 1, 4, 4) of the links' frames and the foot's at joint angles 0, each in the one before it."""
+    frames = leg.frames_B(np.zeros(len(leg.links)))
+    return np.concatenate([frames[:1], np.linalg.solve(frames[:-1], frames[1:])])
 
 
 def _add_foot(model: etree._Element, robot: Robot, leg: Leg, foot: etree._Element, shank: str) -> None:

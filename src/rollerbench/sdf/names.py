@@ -43,6 +43,11 @@ def leg_joint(leg: str, number: int) -> str:
     return f"{leg}_joint_{number}"
 
 
+def leg_joints(leg: str, count: int) -> list[str]:
+    """All joints of a leg, from the hip on."""
+    return [leg_joint(leg, number) for number in range(1, count + 1)]
+
+
 def foot(leg: str) -> str:
     """Wheel at a leg's foot; its joint is `drive_joint(leg)`."""
     return f"{leg}_wheel"
