@@ -190,7 +190,13 @@ class RobotModel:
         """Stands the robot on level ground at a planar pose (3,) in W, sunk in by what its weight will do.
 
         Legs take a posture, by default the first.
+
+        Raises:
+            SimulationError: the robot has no such posture.
         """
+        postures = [standing.name for standing in self.robot.standing]
+        if posture is not None and posture not in postures:
+            raise SimulationError(f"set_pose: posture = {posture!r}: accepted: {', '.join(postures) or 'None'}")
         x, y, yaw = np.asarray(q_xyt, dtype=np.float64)
         for leg in self.robot.legs:
             for joint, angle in zip(
