@@ -92,4 +92,52 @@ def mixed() -> Data:
     }
 
 
+def quadruped() -> Data:
+    """Four legs of three joints, as most walkers have, on feet that do not roll."""
+    links = [
+        {"a": 0.05, "alpha_deg": 90, "min_deg": -60, "max_deg": 60, "mass": 0.4, "rotor_inertia": 0.005},
+        {"a": 0.2, "min_deg": -90, "max_deg": 90, "mass": 0.5, "max_effort": 40},
+        {"a": 0.25, "theta_offset_deg": -100, "min_deg": -60, "max_deg": 90, "mass": 0.3, "max_speed": 8},
+    ]
+    corners = {"fl": (1, 1, 45.0), "fr": (1, -1, -45.0), "rl": (-1, 1, 135.0), "rr": (-1, -1, -135.0)}
+    foot = {"radius": 0.03, "width": 0.03, "mass": 0.1, "driven": False}
+    return {
+        "name": "test_quadruped",
+        "body": {**BODY, "center_of_mass": [0.01, 0.0, 0.0]},
+        "legs": [
+            {
+                **{"name": name, "hip": [0.2 * x, 0.1 * y, 0.02], "mounting_deg": mounting, "links": links},
+                **{"wheel": {**foot, "friction": 0.6 if name == "fl" else 0.9}},
+                **{"postures": {"stand": [0, 30, 0], "low": [10 * x * y, 40, 5]}},
+            }
+            for name, (x, y, mounting) in corners.items()
+        ],
+    }
+
+
+def octopod() -> Data:
+    """Eight of the hexapod's legs, in the posture of an insect."""
+    links = [
+        {"alpha_deg": 90, "mass": 0.5},
+        {"a": 0.2, "mass": 0.7},
+        {"alpha_deg": -90, "theta_offset_deg": 90, "mass": 0.3},
+        {"d": -0.22, "a": 0.09, "alpha_deg": -90, "mass": 0.6},
+    ]
+    wheel = {"radius": 0.06, "width": 0.04, "mass": 0.4, "max_effort": 20}
+    return {
+        "name": "test_octopod",
+        "body": {"size": [1.2, 0.4, 0.1], "mass": 20.0},
+        "postures": [{"name": "insect", "hold": "tibia"}],
+        "legs": [
+            {
+                **{"name": f"{side}_{number}", "hip": [0.45 - 0.3 * number, 0.2 * y, 0.0], "mounting_deg": 90.0 * y},
+                **{"links": links, "wheel": wheel, "postures": {"insect": [0, 20, -110, 90 * y]}},
+            }
+            for side, y in (("left", 1), ("right", -1))
+            for number in range(4)
+        ],
+    }
+
+
 ALL = {"mecanum": mecanum, "cart": cart, "kiwi": kiwi, "swerve": swerve, "mixed": mixed}
+LEGGED = {"quadruped": quadruped, "octopod": octopod}

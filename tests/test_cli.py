@@ -42,6 +42,12 @@ def test_one_robot_is_shown_in_full() -> None:
         assert words in out
 
 
+def test_a_robot_with_legs_is_shown_in_full() -> None:
+    out = rollerbench("robots", "wheel_leg_hexapod").stdout
+    for words in ("6 legs of 4 joints", "Denavit-Hartenberg", "q3 +90", "-0.22", "insect", "0.2116", "0.249", "30 kg"):
+        assert words in out
+
+
 def test_run_prints_a_table_and_writes_the_folder(tmp_path: Path) -> None:
     done = rollerbench("run", "youbot_plus_y", "-o", "out", "--no-recording", "--set", "duration=1.2", cwd=tmp_path)
     assert done.returncode == 0
@@ -55,6 +61,7 @@ def test_run_prints_a_table_and_writes_the_folder(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
+        (["analyze", "wheel_leg_hexapod"], "wheel_leg_hexapod stands on legs; accepted: robots with wheels"),
         (["run", "no_such"], "no scenario 'no_such'"),
         (["run", "youbot_plus_x", "--robot", "no_such"], "no robot 'no_such'"),
         (["run", "youbot_plus_x", "--set", "plant.time_step=fast"], "plant.time_step = 'fast'"),

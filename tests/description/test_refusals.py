@@ -51,6 +51,47 @@ REFUSALS = [
 ]
 
 
+LEG_REFUSALS = [
+    (["wheels"], [{**robots.TYRE, "name": "w", "position": [0, 0]}], ["legs", "legs and wheels on one body"]),
+    (["legs", 1, "name"], "fl", ["legs[1].name = 'fl'", "another leg has this name"]),
+    (["legs", 0, "postures", "stand"], [0, 30], ["legs[0].postures.stand", "2 angles", "each of the 3 links"]),
+    (
+        ["legs", 0, "postures", "stand"],
+        [0, 95, 0],
+        ["legs[0].postures.stand[1] = 95", "beyond the limits", "-90 to 90"],
+    ),
+    (["legs", 3, "postures"], {"stand": [0, 30, 0]}, ["legs[3].postures", "no angles for the posture low"]),
+    (["legs", 3, "postures", "stand"], [0, 45, 0], ["the foot of leg rr hangs", "above the ground"]),
+    (["legs", 0, "links", 0, "min_deg"], 80, ["legs[0].links[0]", "min_deg = 80", "less than max_deg = 60"]),
+    (["legs", 0, "links", 1, "mass"], 0, ["legs[0].links[1].mass = 0", "greater than 0"]),
+    (["legs", 0, "wheel", "width"], 0.1, ["legs[0].wheel", "width = 0.1", "diameter, 0.06"]),
+    (["postures"], [{"name": "stand", "hold": "tibia"}], ["postures[0].hold = 'tibia'", "3 joints", "least"]),
+    (["postures"], [{"name": "fly"}], ["no angles for the posture fly"]),
+    (["body", "center_of_mass"], [2.0, 0, 0], ["body.center_of_mass", "tips over"]),
+]
+
+
+@pytest.mark.parametrize(("path", "value", "words"), LEG_REFUSALS)
+def test_a_fault_in_legs_is_named(path: list[Any], value: Any, words: list[str]) -> None:
+    data = copy.deepcopy(robots.quadruped())
+    _set(data, path, value)
+    with pytest.raises(rb.DescriptionError) as caught:
+        rb.load_robot(data)
+    for word in words:
+        assert word in str(caught.value)
+
+
+@pytest.mark.parametrize("ask", [rb.WheelKinematics, rb.limits.speed_polygon, rb.limits.isotropy,
+                                 lambda robot: rb.limits.max_speed(robot, 0.0),
+                                 lambda robot: rb.limits.max_yaw_rate(robot),
+                                 lambda robot: rb.limits.max_acceleration(robot, 0.0),
+                                 lambda robot: rb.limits.wheel_loads(robot, 0.0, 0.0),
+                                 lambda robot: rb.limits.wheel_efforts(robot, 0.0, 1.0)])  # fmt: skip
+def test_questions_about_wheels_are_refused_for_legs(ask: Callable[[Data], object]) -> None:
+    with pytest.raises(rb.KinematicsError, match="test_quadruped stands on legs; accepted: robots with wheels"):
+        ask(robots.quadruped())
+
+
 @pytest.mark.parametrize(("path", "value", "words"), REFUSALS)
 def test_a_fault_is_named(path: list[Any], value: Any, words: list[str]) -> None:
     data = copy.deepcopy(robots.mecanum())

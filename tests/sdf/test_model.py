@@ -14,7 +14,7 @@ import robots
 import rollerbench as rb
 from rollerbench.resources import models_dir, robot_names
 
-EVERY = {**{name: (lambda name=name: name) for name in robot_names()}, **robots.ALL}
+EVERY = {**{name: (lambda name=name: name) for name in robot_names()}, **robots.ALL, **robots.LEGGED}
 
 
 def _loaded(robot: rb.Robot, caplog: pytest.LogCaptureFixture) -> tuple[MultibodyPlant, SceneGraph, object]:
@@ -52,6 +52,9 @@ def test_drake_loads_the_same_masses_without_a_word(make, caplog: pytest.LogCapt
     plant, _, _ = _loaded(robot, caplog)
     assert caplog.records == []
     context = plant.CreateDefaultContext()
+    for leg in robot.legs:
+        for number, angle in enumerate(leg.posture(robot.standing[0].name), start=1):
+            plant.GetJointByName(f"{leg.name}_joint_{number}").set_angle(context, angle)
     bodies = plant.GetBodyIndices(plant.GetModelInstanceByName(robot.name))
     body = plant.GetBodyByName("body")
     inertia = plant.CalcSpatialInertia(context, body.body_frame(), bodies)
@@ -63,11 +66,14 @@ def test_drake_loads_the_same_masses_without_a_word(make, caplog: pytest.LogCapt
 
 
 @pytest.mark.parametrize("make", EVERY.values(), ids=EVERY)
-def test_motors_are_on_driven_and_steered_wheels_only(make, caplog: pytest.LogCaptureFixture) -> None:
+def test_motors_are_on_driven_and_steered_wheels_and_legs_only(make, caplog: pytest.LogCaptureFixture) -> None:
     robot = rb.load_robot(make())
     plant, _, _ = _loaded(robot, caplog)
     expected = {f"{wheel.name}_drive": wheel.max_effort or np.inf for wheel in robot.driven_wheels}
     expected |= {f"{wheel.name}_swivel": wheel.max_steering_effort or np.inf for wheel in robot.steered_wheels}
+    for leg in robot.legs:
+        expected |= {f"{leg.name}_joint_{i}": link.max_effort or np.inf for i, link in enumerate(leg.links, start=1)}
+        expected |= {f"{leg.name}_drive": leg.wheel.max_effort or np.inf} if leg.wheel.driven else {}
     actuators = [plant.get_joint_actuator(index) for index in plant.GetJointActuatorIndices()]
     assert {actuator.joint().name(): actuator.effort_limit() for actuator in actuators} == expected
 
@@ -83,8 +89,10 @@ def test_wheels_touch_only_the_ground(make, caplog: pytest.LogCaptureFixture) ->
         for frame in inspector.GetAllFrameIds()
         for geometry in inspector.GetGeometries(frame, Role.kProximity)
     ]
-    ellipsoids = [shape for shape in shapes if type(shape).__name__ == "Ellipsoid"]
-    assert len(ellipsoids) == sum(wheel.ring.count if wheel.ring else 1 for wheel in robot.wheels)
+    kinds = [type(shape).__name__ for shape in shapes]
+    assert kinds.count("Ellipsoid") == sum(wheel.ring.count if wheel.ring else 1 for wheel in robot.wheels)
+    assert kinds.count("Sphere") == len(robot.legs)
+    assert kinds.count("Box") == 1
 
 
 def test_a_forward_turn_of_the_hub_moves_its_bottom_backward() -> None:

@@ -46,6 +46,8 @@ def test_the_model_is_the_robot(name: str) -> None:
     robot = rb.load_robot(name)
     model = mujoco.MjModel.from_xml_string(robot_to_mjcf(robot))
     data = mujoco.MjData(model)
+    if robot.legs:
+        mujoco.mj_resetDataKeyframe(model, data, 0)
     mujoco.mj_forward(model, data)
     assert model.body_subtreemass[1] == pytest.approx(robot.mass)
     body = data.body("body")
@@ -57,7 +59,8 @@ def test_the_model_is_the_robot(name: str) -> None:
     x, y = robot.inertia.com[:2]
     inertia = robot.inertia.moment[2, 2] + robot.mass * (x**2 + y**2)
     assert 2 * data.energy[1] == pytest.approx(inertia, rel=1e-9)
-    assert model.nu == len(robot.driven_wheels) + len(robot.steered_wheels)
+    of_legs = sum(len(leg.links) + leg.wheel.driven for leg in robot.legs)
+    assert model.nu == len(robot.driven_wheels) + len(robot.steered_wheels) + of_legs
 
 
 @pytest.mark.parametrize("make", robots.ALL.values(), ids=robots.ALL.keys())

@@ -20,7 +20,7 @@ STRAIGHT = {"differential_cart", "six_wheel"}
 VERSIONS = {"rollerbench": "1", "drake": "1", "python": "3"}
 
 
-@pytest.mark.parametrize("name", robot_names())
+@pytest.mark.parametrize("name", [name for name in robot_names() if rb.load_robot(name).wheels])
 def test_every_shipped_robot(name: str, tmp_path: Path) -> None:
     seen: list[tuple[float, float]] = []
     done = analyze(name, output=tmp_path, roll_resistance=0.02, progress=lambda now, total: seen.append((now, total)))

@@ -1,13 +1,32 @@
 """The rows of the wheel equations, for all wheels of a robot at once."""
 
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import cosdg, sindg
 
-from rollerbench.description import AnyWheel, Robot
+from rollerbench.description import AnyWheel, Robot, load_robot
 from rollerbench.description.wheels import RollerWheel
+from rollerbench.errors import KinematicsError
 
 Array = NDArray[np.float64]
+
+
+def wheeled(robot: Robot | str | Path | Mapping[str, Any]) -> Robot:
+    """The robot, by itself, name, path or content, if it stands on wheels.
+
+    Raises:
+        KinematicsError: it stands on legs.
+    """
+    loaded = load_robot(robot)
+    if loaded.legs:
+        raise KinematicsError(
+            f"robot {loaded.name} stands on legs; accepted: robots with wheels (for legs see rollerbench.legs)"
+        )
+    return loaded
 
 
 def wheel_rows(robot: Robot, positions: Array, swivel_angles: Array) -> tuple[Array, Array]:

@@ -21,11 +21,11 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rollerbench.description import Robot, load_robot
+from rollerbench.description import Robot
 from rollerbench.description.wheels import RollerWheel
 from rollerbench.errors import InfeasibleTwist, KinematicsError
 from rollerbench.kinematics.mobility import Mobility, degree_of_mobility, null_space
-from rollerbench.kinematics.rows import finite_roller_slope, wheel_rows
+from rollerbench.kinematics.rows import finite_roller_slope, wheel_rows, wheeled
 
 Array = NDArray[np.float64]
 SKID_TOLERANCE = 1e-9
@@ -66,9 +66,9 @@ class WheelKinematics:
             swivel_angles: Angles from heading_deg by name of castors and steered wheels [rad]; 0 for those left out.
 
         Raises:
-            KinematicsError: an argument does not fit the robot.
+            KinematicsError: an argument does not fit the robot, or it stands on legs.
         """
-        self.robot = load_robot(robot)
+        self.robot = wheeled(robot)
         if rollers not in ("textbook", "finite"):
             raise KinematicsError(f"rollers = {rollers!r}: accepted: 'textbook', 'finite'")
         self.rollers: Literal["textbook", "finite"] = rollers

@@ -3,6 +3,15 @@
 from rollerbench.plant.ground import add_ground
 from rollerbench.plant.robot_model import RobotModel, add_robot
 from rollerbench.plant.window import RollerWindow, follow_rollers
-from rollerbench.sdf.servo import ServoGains, servo_gains
+from rollerbench.sdf.servo import LegGains, ServoGains, servo_gains
 
-__all__ = ["RobotModel", "RollerWindow", "ServoGains", "add_ground", "add_robot", "follow_rollers", "servo_gains"]
+__all__ = [
+    "LegGains",
+    "RobotModel",
+    "RollerWindow",
+    "ServoGains",
+    "add_ground",
+    "add_robot",
+    "follow_rollers",
+    "servo_gains",
+]

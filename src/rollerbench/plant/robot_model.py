@@ -14,14 +14,14 @@ from pydrake.multibody.tree import (
     JointActuator,
     JointIndex,
     ModelInstanceIndex,
-    PdControllerGains,
     RevoluteJoint,
     RigidBody,
 )
 from pydrake.systems.framework import Context, DiagramBuilder
 
-from rollerbench.description import AnyWheel, Robot, load_robot
+from rollerbench.description import AnyWheel, Leg, Robot, load_robot
 from rollerbench.errors import SimulationError
+from rollerbench.plant.servos import leg_and_wheel_joints, set_gains
 from rollerbench.plant.window import RollerWindow, WindowedWheel
 from rollerbench.sdf import names, robot_to_sdf
 from rollerbench.sdf.contact import static_penetration
@@ -67,6 +67,18 @@ class RobotModel:
         if self.roller_window is not None and wheel.name in self.roller_window.windows:
             count = self.roller_window.windows[wheel.name].size
         return [self._joint(names.roller_joint(wheel.name, index)) for index in range(count)]
+
+    def leg_joints(self, leg: Leg) -> list[RevoluteJoint]:
+        """The joints of a leg, from the hip on."""
+        return [self._joint(name) for name in names.leg_joints(leg.name, len(leg.links))]
+
+    def wheel_joint(self, leg: Leg) -> RevoluteJoint:
+        """The joint about the axle of a foot's driven wheel."""
+        return self._joint(names.drive_joint(leg.name))
+
+    def foot_body(self, leg: Leg) -> RigidBody:
+        """The wheel at a leg's foot; its frame at wheel angle 0 is the last of `Leg.frames_B`."""
+        return self.plant.GetBodyByName(names.foot(leg.name), self.model_instance)
 
     @property
     def actuators(self) -> list[JointActuator]:
@@ -117,6 +129,35 @@ class RobotModel:
             matrix[row, self.position_index(self.drive_joint(wheel))] = 1.0
         return matrix
 
+    def leg_state_matrix(self) -> NDArray[np.float64]:
+        """Matrix (2 n, nq + nv) from the robot's state [q; v] to [angles; rates] of its legs' n joints and wheels.
+
+        Leg by leg, each leg's joints and then its wheel; 0 for a wheel that is locked.
+        """
+        offset, joints = self.plant.num_positions(self.model_instance), leg_and_wheel_joints(self.robot)
+        matrix = np.zeros((2 * len(joints), self.plant.num_multibody_states(self.model_instance)))
+        for row, name in enumerate(joints):
+            if name is not None:
+                matrix[row, self.position_index(self._joint(name))] = 1.0
+                matrix[row + len(joints), offset + self.velocity_index(self._joint(name))] = 1.0
+        return matrix
+
+    def leg_command_matrix(self) -> NDArray[np.float64]:
+        """Matrix (2 n_actuators, 2 n) from desired [angles; rates] to the servo's [q; v], ordered like the state."""
+        efforts = self.leg_effort_matrix()
+        nothing = np.zeros_like(efforts)
+        return np.block([[efforts, nothing], [nothing, efforts]])
+
+    def leg_effort_matrix(self) -> NDArray[np.float64]:
+        """Matrix (n_actuators, n) from torques [N m], in the order of `leg_state_matrix`, to the actuation port."""
+        row = {actuator.joint().name(): index for index, actuator in enumerate(self.actuators)}
+        joints = leg_and_wheel_joints(self.robot)
+        matrix = np.zeros((len(row), len(joints)))
+        for column, name in enumerate(joints):
+            if name is not None:
+                matrix[row[name], column] = 1.0
+        return matrix
+
     def body_state_matrix(self) -> NDArray[np.float64]:
         """Matrix (13, nq + nv) from the robot's state to its body's [quaternion, p_WB, w_WB_W, v_WB_W]."""
         plant, instance = self.plant, self.model_instance
@@ -145,11 +186,24 @@ class RobotModel:
         """Index of a joint's rate in the robot's velocities."""
         return int(joint.velocity_start()) - self._first_velocity
 
-    def set_pose(self, context: Context, q_xyt: ArrayLike) -> None:
-        """Stands the robot on level ground at a planar pose (3,) in W, sunk in by what its weight will do."""
+    def set_pose(self, context: Context, q_xyt: ArrayLike, posture: str | None = None) -> None:
+        """Stands the robot on level ground at a planar pose (3,) in W, sunk in by what its weight will do.
+
+        Legs take a posture, by default the first.
+
+        Raises:
+            SimulationError: the robot has no such posture.
+        """
+        postures = [standing.name for standing in self.robot.standing]
+        if posture is not None and posture not in postures:
+            raise SimulationError(f"set_pose: posture = {posture!r}: accepted: {', '.join(postures) or 'None'}")
         x, y, yaw = np.asarray(q_xyt, dtype=np.float64)
-        height = -self.robot.ground_height - static_penetration(self.robot)
-        pose = RigidTransform(RollPitchYaw(0.0, 0.0, yaw), [x, y, height])
+        for leg in self.robot.legs:
+            for joint, angle in zip(
+                self.leg_joints(leg), leg.posture(posture or self.robot.standing[0].name), strict=True
+            ):
+                joint.set_angle(context, angle)
+        pose = RigidTransform(RollPitchYaw(0.0, 0.0, yaw), [x, y, _standing_height(self.robot, posture)])
         self.plant.SetFreeBodyPose(context, self.body, pose)
 
     @property
@@ -202,7 +256,7 @@ def add_robot(
     robot = load_robot(robot)
     if roller_model not in ("full", "windowed"):
         raise SimulationError(f"add_robot: roller_model = {roller_model!r}: accepted: 'full', 'windowed'")
-    windows = _windows(robot, plant, builder, window_size) if roller_model == "windowed" else {}
+    windows = _windows(robot, plant, builder, window_size) if roller_model == "windowed" and robot.wheels else {}
     parser = Parser(plant)
     parser.SetAutoRenaming(True)
     (instance,) = parser.AddModelsFromString(robot_to_sdf(robot, windows, visuals=visuals), "sdf")
@@ -213,20 +267,20 @@ def add_robot(
         roller_window = builder.AddSystem(RollerWindow(plant, wheels, robot.name))
         roller_window.set_name(f"{plant.GetModelInstanceName(instance)}_rollers")
     model = RobotModel(robot=robot, plant=plant, model_instance=instance, body=body, roller_window=roller_window)
-    standing = RigidTransform([0.0, 0.0, -robot.ground_height - static_penetration(robot)])
-    plant.SetDefaultFloatingBaseBodyPose(model.body, standing)
-    gains = gains or servo_gains(robot)
-    for wheel in robot.driven_wheels:
-        if wheel.name not in gains.drive_damping:
-            continue
-        actuator = plant.GetJointActuatorByName(names.drive_joint(wheel.name), instance)
-        actuator.set_controller_gains(PdControllerGains(p=0.0, d=gains.drive_damping[wheel.name]))
-    for wheel in robot.steered_wheels:
-        actuator = plant.GetJointActuatorByName(names.swivel_joint(wheel.name), instance)
-        actuator.set_controller_gains(
-            PdControllerGains(p=gains.steering_stiffness[wheel.name], d=gains.steering_damping[wheel.name])
-        )
+    plant.SetDefaultFloatingBaseBodyPose(body, RigidTransform([0.0, 0.0, _standing_height(robot)]))
+    for leg in robot.legs:
+        for joint, angle in zip(model.leg_joints(leg), leg.posture(robot.standing[0].name), strict=True):
+            joint.set_default_angle(angle)
+    set_gains(plant, instance, robot, gains or servo_gains(robot))
     return model
+
+
+def _standing_height(robot: Robot, posture: str | None = None) -> float:
+    """Height of Bo above level ground, sunk in by what the weight does [m]."""
+    ground = robot.ground_height
+    if robot.legs:
+        ground = min(foot[2] - leg.wheel.radius for foot, leg in zip(robot.feet_B(posture), robot.legs, strict=True))
+    return -float(ground) - static_penetration(robot)
 
 
 def _windows(

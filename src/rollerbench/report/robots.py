@@ -12,6 +12,7 @@ from rollerbench.description import Robot
 from rollerbench.description.files import read_yaml
 from rollerbench.errors import KinematicsError
 from rollerbench.kinematics import WheelKinematics
+from rollerbench.report.legs import leg_details, legs_summary
 from rollerbench.report.terminal import matrix_table
 
 TWIST = ("vx [m/s]", "vy [m/s]", "wz [rad/s]")
@@ -19,18 +20,24 @@ TWIST = ("vx [m/s]", "vy [m/s]", "wz [rad/s]")
 
 def robot_list(robots: Iterable[Robot]) -> Table:
     """One row a robot."""
-    table = Table("Robot", "Wheels", escape("Mass [kg]"), "Mobility", "Summary")
+    table = Table("Robot", "Wheels or legs", escape("Mass [kg]"), "Mobility", "Summary")
     for robot in robots:
         kinds = [wheel.type for wheel in robot.wheels]
         wheels = ", ".join(f"{kinds.count(kind)} {kind}" for kind in dict.fromkeys(kinds))
-        mobility = WheelKinematics(robot).mobility()
-        degrees = f"({mobility.degree_of_mobility}, {mobility.degree_of_steerability})"
+        degrees = "-"
+        if robot.legs:
+            wheels = legs_summary(robot)
+        else:
+            mobility = WheelKinematics(robot).mobility()
+            degrees = f"({mobility.degree_of_mobility}, {mobility.degree_of_steerability})"
         table.add_row(robot.name, wheels, f"{robot.mass:.4g}", degrees, escape(robot.summary))
     return table
 
 
 def robot_details(robot: Robot) -> list[Table]:
-    """Matrices, measures and limits of a robot."""
+    """Matrices, measures and limits of a robot; of one with legs, its legs and postures."""
+    if robot.legs:
+        return leg_details(robot)
     kinematics = WheelKinematics(robot)
     driven = [wheel.name for wheel in robot.driven_wheels]
     tyres = [f"tyre {index}" for index in range(len(kinematics.constraint_matrix))]

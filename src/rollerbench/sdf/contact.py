@@ -1,4 +1,4 @@
-"""Contact parameters that follow from a robot's weight and wheels."""
+"""Contact parameters that follow from a robot's weight and wheels, or the wheels at its feet."""
 
 import math
 
@@ -11,12 +11,12 @@ PENETRATION_RATIO = 5e-4
 
 def static_penetration(robot: Robot) -> float:
     """Depth by which the wheels sink into rigid ground under the robot's weight [m]."""
-    return PENETRATION_RATIO * min(wheel.radius for wheel in robot.wheels)
+    return PENETRATION_RATIO * min(_radii(robot))
 
 
 def contact_stiffness(robot: Robot) -> float:
     """Stiffness of a wheel's contact with rigid ground [N/m], by which a wheel with an even share sinks as above."""
-    load = robot.mass * GRAVITY / len(robot.wheels)
+    load = robot.mass * GRAVITY / len(_radii(robot))
     return load / static_penetration(robot)
 
 
@@ -26,3 +26,7 @@ def contact_dissipation(robot: Robot) -> float:
     Under the load m g = k x0 the contact is a spring k with the damper k x0 d; it is critical at d = 2 / sqrt(g x0).
     """
     return 1.0 / math.sqrt(GRAVITY * static_penetration(robot))
+
+
+def _radii(robot: Robot) -> list[float]:
+    return [wheel.radius for wheel in robot.wheels] + [leg.wheel.radius for leg in robot.legs]

@@ -6,13 +6,14 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rollerbench.description import Robot, load_robot
+from rollerbench.description import Robot
 from rollerbench.description.inertia import GRAVITY
 from rollerbench.errors import KinematicsError
 from rollerbench.kinematics.limits.cone_program import Cones, maximize, slack
 from rollerbench.kinematics.limits.contact_forces import Affine, ContactForces
 from rollerbench.kinematics.limits.efforts import constant_loads, least_norm
 from rollerbench.kinematics.limits.result import Limit, finite_number, unit_vectors
+from rollerbench.kinematics.rows import wheeled
 
 Array = NDArray[np.float64]
 
@@ -61,7 +62,7 @@ def max_acceleration(
     Raises:
         KinematicsError: an argument is malformed.
     """
-    robot = load_robot(robot)
+    robot = wheeled(robot)
     shape, u = unit_vectors(direction)
     _accept("adhesion", adhesion, ("circle", "independent"))
     _accept("sharing", sharing, ("best", "least_norm"))

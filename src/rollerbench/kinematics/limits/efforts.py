@@ -5,10 +5,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rollerbench.description import Robot, load_robot
+from rollerbench.description import Robot
 from rollerbench.errors import InfeasibleTwist, KinematicsError
 from rollerbench.kinematics.limits.contact_forces import Affine, ContactForces
 from rollerbench.kinematics.limits.result import CAUSES, finite, finite_number, unit_vectors
+from rollerbench.kinematics.rows import wheeled
 
 Array = NDArray[np.float64]
 
@@ -46,7 +47,7 @@ def wheel_efforts(
         InfeasibleTwist: tyres forbid a direction (only if strict).
         KinematicsError: an argument is malformed, or (if strict) the driven wheels cannot push in a direction.
     """
-    robot = load_robot(robot)
+    robot = wheeled(robot)
     shape, u = unit_vectors(direction)
     a = _accelerations(acceleration)
     resistance = finite_number("roll_resistance", roll_resistance, smallest=0.0)
@@ -69,7 +70,7 @@ def wheel_loads(robot: Robot | str | Path, direction: ArrayLike, acceleration: A
     Raises:
         KinematicsError: an argument is malformed.
     """
-    robot = load_robot(robot)
+    robot = wheeled(robot)
     shape, u = unit_vectors(direction)
     a = _accelerations(acceleration)
     loads = ContactForces(robot, u, 0.0, None).loads

@@ -6,10 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from rollerbench.description import Robot, load_robot
+from rollerbench.description import Robot
 from rollerbench.errors import KinematicsError
 from rollerbench.kinematics.limits.polygon import speed_polygon
 from rollerbench.kinematics.mobility import null_space
+from rollerbench.kinematics.rows import wheeled
 from rollerbench.kinematics.wheels import WheelKinematics
 
 
@@ -39,7 +40,7 @@ def isotropy(robot: Robot | str | Path) -> Isotropy:
 
     Source: Salisbury and Craig (1982) for the condition number, Yoshikawa (1985) for the manipulability.
     """
-    robot = load_robot(robot)
+    robot = wheeled(robot)
     kinematics = WheelKinematics(robot)
     places = np.array([wheel.p_BoHo_B[:2] for wheel in robot.wheels])
     length = math.sqrt(float(np.mean(np.sum(places**2, axis=1))))

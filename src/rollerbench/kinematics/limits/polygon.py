@@ -8,10 +8,11 @@ from numpy.typing import NDArray
 from scipy.optimize import linprog
 from scipy.spatial import HalfspaceIntersection
 
-from rollerbench.description import Robot, load_robot
+from rollerbench.description import Robot
 from rollerbench.errors import KinematicsError
 from rollerbench.kinematics.limits.result import finite_number
 from rollerbench.kinematics.limits.speed import SpeedRows, speed_rows
+from rollerbench.kinematics.rows import wheeled
 
 Array = NDArray[np.float64]
 
@@ -56,7 +57,7 @@ def speed_polygon(robot: Robot | str | Path, yaw_rate: float = 0.0) -> SpeedPoly
     Raises:
         KinematicsError: the limits of the wheels leave a speed unlimited, or forbid the yaw rate.
     """
-    robot = load_robot(robot)
+    robot = wheeled(robot)
     yaw_rate = finite_number("yaw_rate", yaw_rate)
     rows = speed_rows(robot)
     origin, basis = _tyres_allow(robot, rows, yaw_rate)

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rollerbench.description import Robot, load_robot
+from rollerbench.description import Robot
 from rollerbench.errors import KinematicsError
 from rollerbench.kinematics.limits.result import Limit, finite, unit_vectors
-from rollerbench.kinematics.rows import wheel_rows
+from rollerbench.kinematics.rows import wheel_rows, wheeled
 
 Array = NDArray[np.float64]
 
@@ -97,7 +97,7 @@ def max_speed(
     Raises:
         KinematicsError: an argument is not finite, or they do not broadcast, or both yaw_rate and curvature are given.
     """
-    robot = load_robot(robot)
+    robot = wheeled(robot)
     turns = finite("yaw_rate", yaw_rate), finite("curvature", curvature)
     if turns[0].any() and turns[1].any():
         raise KinematicsError(f"yaw_rate = {yaw_rate!r}, curvature = {curvature!r}: accepted: one of them")
@@ -122,7 +122,7 @@ def max_yaw_rate(robot: Robot | str | Path, p_BoICR_B: ArrayLike = (0.0, 0.0)) -
     Raises:
         KinematicsError: p_BoICR_B is not finite or not of shape (..., 2).
     """
-    robot = load_robot(robot)
+    robot = wheeled(robot)
     centers = finite("p_BoICR_B", p_BoICR_B)
     if centers.ndim == 0 or centers.shape[-1] != 2:
         raise KinematicsError(f"p_BoICR_B has shape {centers.shape}: accepted: (..., 2)")
