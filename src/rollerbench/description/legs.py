@@ -209,26 +209,34 @@ def chain_frames(rows: Array, q: Array) -> Array:
     Returns:
         (..., n + 1, 4, 4): of each joint's frame, which turns with its link, then of the last link's end.
     """
-    a, alpha, d, offset = np.moveaxis(rows, -1, 0)
-    theta = q + offset
-    shape, count = np.broadcast_shapes(theta.shape, a.shape), q.shape[-1]
-    turns = np.zeros((*shape, 4, 4))
+    return turned_frames(chain_links(rows), q + rows[..., 3])
+
+
+def chain_links(rows: Array) -> Array:
+    """Transforms (..., n, 4, 4) along the links of chains, without the turns of their joints."""
+    a, alpha, d = rows[..., 0], rows[..., 1], rows[..., 2]
+    links = np.zeros((*alpha.shape, 4, 4))
+    links[..., 0, 0] = links[..., 3, 3] = 1.0
+    links[..., 1, 1] = links[..., 2, 2] = np.cos(alpha)
+    links[..., 2, 1] = np.sin(alpha)
+    links[..., 1, 2] = -links[..., 2, 1]
+    links[..., 0, 3], links[..., 2, 3] = a, d
+    return links
+
+
+def turned_frames(links: Array, theta: Array) -> Array:
+    """Poses (..., n + 1, 4, 4) along chains of links (..., n, 4, 4) whose joints are turned by theta (..., n) [rad]."""
     cos, sin = np.cos(theta), np.sin(theta)
+    turns = np.zeros((*theta.shape, 4, 4))
     turns[..., 0, 0] = turns[..., 1, 1] = cos
     turns[..., 1, 0] = sin
     turns[..., 0, 1] = -sin
     turns[..., 2, 2] = turns[..., 3, 3] = 1.0
-    steps = np.zeros((*shape, 4, 4))
-    cos, sin = np.cos(alpha), np.sin(alpha)
-    steps[..., 0, 0] = steps[..., 3, 3] = 1.0
-    steps[..., 1, 1] = steps[..., 2, 2] = cos
-    steps[..., 2, 1] = sin
-    steps[..., 1, 2] = -sin
-    steps[..., 0, 3], steps[..., 2, 3] = a, d
-    frames = np.empty((*shape[:-1], count + 1, 4, 4))
+    count = theta.shape[-1]
+    frames = np.empty((*theta.shape[:-1], count + 1, 4, 4))
     frames[..., 0, :, :] = turns[..., 0, :, :]
-    links = np.matmul(steps[..., :-1, :, :], turns[..., 1:, :, :])
+    steps = links[..., :-1, :, :] @ turns[..., 1:, :, :]
     for joint in range(1, count):
-        frames[..., joint, :, :] = frames[..., joint - 1, :, :] @ links[..., joint - 1, :, :]
-    frames[..., count, :, :] = frames[..., count - 1, :, :] @ steps[..., -1, :, :]
+        frames[..., joint, :, :] = frames[..., joint - 1, :, :] @ steps[..., joint - 1, :, :]
+    frames[..., count, :, :] = frames[..., count - 1, :, :] @ links[..., -1, :, :]
     return frames

@@ -5,8 +5,10 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 
 from rollerbench.description import Posture
+from rollerbench.kinematics.legs.group import Hold, LegGroup
 from rollerbench.kinematics.legs.smooth import quintic
 
 Array = NDArray[np.float64]
@@ -21,8 +23,56 @@ CLIMB_SPEED = 0.1
 ROLL_SPEED = 0.06
 """Mean speed at which wheels roll into another posture [m/s]."""
 
+PIVOT_SPEED = 0.6
+"""Mean speed at which wheels pivot under their hips [rad/s]."""
+
 BEND = 0.6
-"""Distance of the control points of a rolling foot's path from its ends, over that of its ends [-]."""
+"""Distance of the control points of a wheel's curve from its ends, over that of its ends [-]."""
+
+ASIDE = np.radians(30.0)
+"""By how much a wheel's way to its hip is turned from the leg, to the side to which the wheel rolls [rad]."""
+
+STRAIGHT = 0.65
+"""Share of its distance from the hip on which a wheel rolls straight towards it [-]."""
+
+NEAR = 0.3
+"""Share of this straight way after which its direction no longer follows from the leg's [-]."""
+
+UNDER_HIP = 0.02
+"""Feet this close to the axis of their hip stand under it [m]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Course:
+    """Where wheels roll, at m even steps.
+
+    Attributes:
+        contact: Places (m, k, 2) of the feet, in B [m].
+        heading: Directions (m, k) in which the wheels roll ahead, without jumps [rad].
+    """
+
+    contact: Array
+    heading: Array
+
+    @property
+    def reversed(self) -> "Course":
+        """The same way back."""
+        return Course(contact=self.contact[::-1], heading=self.heading[::-1])
+
+    @property
+    def length(self) -> float:
+        """Length of the longest way [m]."""
+        return float(np.linalg.norm(np.diff(self.contact, axis=0), axis=-1).sum(axis=0).max())
+
+    def at(self, u: float) -> tuple[Array, Array]:
+        """Places (k, 2) and directions (k,) at the share u of the way."""
+        place = min(max(u, 0.0), 1.0) * (len(self.contact) - 1)
+        low = min(int(place), len(self.contact) - 2)
+        part = place - low
+        return (
+            (1 - part) * self.contact[low] + part * self.contact[low + 1],
+            (1 - part) * self.heading[low] + part * self.heading[low + 1],
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -35,12 +85,16 @@ class Stage:
         duration: Its time [s].
         height: Height of the body at its end [m].
         legs: Which legs step (k,).
+        course: Where wheels roll, if they do.
+        straight: Whether they roll straight towards their hip, or from there: the legs' last joints then rest.
     """
 
     kind: Literal["climb", "step", "roll"]
     duration: float
     height: float
     legs: Flags
+    course: Course | None = None
+    straight: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -54,8 +108,9 @@ class Change:
         height: Height of the body when it began [m].
         q_from: Joint angles (k, n) when it began [rad].
         q_to: Joint angles (k, n) at which stepping legs arrive [rad].
-        paths: Control points (k, 4, 2) in B of the feet that roll [m].
-        headings: Directions (k,) of the wheels as they begin to roll [rad].
+        steps: Joint angles (k, n) over the progress of legs that step.
+        contact: Where the feet were (k, 2), in B [m].
+        heading: In which directions (k,) the wheels then rolled ahead [rad].
     """
 
     posture: Posture
@@ -64,8 +119,9 @@ class Change:
     height: float
     q_from: Array
     q_to: Array
-    paths: Array
-    headings: Array
+    steps: CubicSpline | None = None
+    contact: Array
+    heading: Array
 
     @property
     def progress(self) -> float:
@@ -76,10 +132,6 @@ class Change:
     def linear(self) -> float:
         """Progress of the present stage in time, from 0 to 1."""
         return min(1.0, self.elapsed / self.stages[0].duration)
-
-    def next_stage(self, q: Array, height: float) -> "Change":
-        """The change when its next stage begins, at joint angles q (k, n)."""
-        return replace(self, stages=self.stages[1:], elapsed=0.0, height=height, q_from=q)
 
 
 def stepping_stages(height: float, step_height: float, end_height: float, groups: list[Flags]) -> list[Stage]:
@@ -97,50 +149,103 @@ def _climb(start: float, end: float, legs: Flags) -> Stage:
     return Stage(kind="climb", duration=duration, height=end, legs=legs)
 
 
-def rolling_paths(start: Array, end: Array, headings: tuple[Array, Array], turn: Array) -> Array:
-    """Control points (k, 4, 2) of the cubic curves along which wheels roll from one place to another.
+def stepping_path(group: LegGroup, q_from: Array, q_to: Array, pose: Array, lift: float) -> CubicSpline:
+    """Joint angles (k, n) over the progress 0..1 from one stance to another, through the air.
 
-    A wheel sets off along its line and arrives along it, so that it turns with its path; whether it rolls ahead or back
-    is chosen by the turn that its leg makes.
+    Joints go evenly, bent on the way such that the feet are lifted.
 
     Args:
-        start: Where the feet are (k, 2) [m].
-        end: Where they shall be (k, 2) [m].
-        headings: Directions of the wheels, at the start and at the end, (k,) each [rad].
-        turn: By how much the legs turn them (k,), counted with full turns [rad].
+        group: The legs.
+        q_from: Joint angles (k, n) at the start [rad].
+        q_to: Joint angles (k, n) at the end [rad].
+        pose: Pose (4, 4) of the body over the ground.
+        lift: Height of the feet's lowest points in the middle [m].
     """
-    reach = BEND * np.maximum(np.hypot(*(end - start).T), 0.02)[:, np.newaxis]
-    first, last = (np.column_stack([np.cos(angle), np.sin(angle)]) for angle in headings)
-    options = [
-        np.stack([start, start + sign * reach * first, end - sign * reach * last, end], axis=1) for sign in (1.0, -1.0)
+    nodes, angles = np.linspace(0.0, 1.0, 5), [q_from]
+    free = Hold(rows=0 * q_from, values=np.zeros(len(q_from)), heading=np.zeros(len(q_from), dtype=bool), near=q_from)
+    for s in nodes[1:-1]:
+        q = q_from + s * (q_to - q_from)
+        centers = group.frames(q)[:, -1, :3, 3] @ pose[:3, :3].T + pose[:3, 3]
+        centers[:, 2] = group.wheel_radius + lift * (0.75 if s != 0.5 else 1.0)
+        q, _, _ = group.inverse((centers - pose[:3, 3]) @ pose[:3, :3], replace(free, near=q), iterations=40)
+        angles.append(q)
+    return CubicSpline(nodes, [*angles, q_to], bc_type="natural")
+
+
+def rolling_stages(
+    outer: tuple[Array, Array], inner: tuple[Array, Array], hips: Array, heights: tuple[float, float]
+) -> list[Stage]:
+    """From feet beside the body to feet under the hips, without a wheel that slips.
+
+    Each wheel rolls along a curve until it points at the axis of its hip, straight under it, and there pivots, while
+    the body climbs.
+
+    Args:
+        outer: Places (k, 2) in B [m] and directions (k,) [rad] of the wheels at the start.
+        inner: The same at the end.
+        hips: Where the hips' axes are (k, 2), in B [m].
+        heights: Heights of the body at the start and at the end [m].
+    """
+    contact, heading = outer
+    arm = contact - hips
+    distance, bearing = np.hypot(*arm.T), np.arctan2(arm[:, 1], arm[:, 0])
+    off = heading - bearing
+    # A wheel rolls back if ahead leads outwards; either way it comes nearer to the hip on the same side.
+    way = -np.sign(np.cos(off))
+    aside = bearing + way * np.sign(np.sin(off)) * ASIDE
+    out = np.column_stack([np.cos(aside), np.sin(aside)])
+    turning = hips + STRAIGHT * distance[:, np.newaxis] * out
+    bend = BEND * np.linalg.norm(turning - contact, axis=1)[:, np.newaxis]
+    ahead = np.column_stack([np.cos(heading), np.sin(heading)])
+    points = [contact, contact + way[:, np.newaxis] * bend * ahead, turning + bend * out, turning]
+    curve = _even(_curve(np.stack(points, axis=1), np.linspace(0.0, 1.0, 401)))
+    slopes = np.gradient(curve, axis=0)
+    tangent = np.unwrap(np.arctan2(slopes[..., 1], slopes[..., 0]), axis=0)
+    turned = heading + tangent - tangent[0]
+    near = inner[0] + NEAR * (turning - inner[0])
+    turn = inner[1] - turned[-1]
+    turn = np.arctan2(np.sin(turn), np.cos(turn))
+    low, high = heights
+    rest = turned[-1]
+    ways = [Course(contact=curve, heading=turned), _line((turning, near), (rest, rest))]
+    ways += [_line((near, inner[0]), (rest, rest)), _line((inner[0], inner[0]), (rest, rest + turn))]
+    times = [max(0.5, way.length / ROLL_SPEED) for way in ways]
+    times[-1] = max(0.5, float(np.abs(turn).max()) / PIVOT_SPEED, abs(high - low) / CLIMB_SPEED)
+    every = np.ones(len(contact), dtype=bool)
+    return [
+        Stage(kind="roll", duration=time, height=height, legs=every, course=way, straight=straight)
+        for way, time, height, straight in zip(
+            ways, times, (low, low, low, high), (False, True, False, False), strict=True
+        )
     ]
-    turns = np.array([_turning(curve(paths, np.linspace(0, 1, 101))[1]) for paths in options])
-    best = np.argmin(np.abs(turns - turn), axis=0)
-    return np.where(best[:, np.newaxis, np.newaxis] == 0, *options)
 
 
-def curve(paths: Array, u: Array) -> tuple[Array, Array]:
-    """Points and derivatives (k, m, 2) of cubic curves at parameters u (m,)."""
-    p = paths[:, :, np.newaxis]
-    s, r = u[:, np.newaxis], 1 - u[:, np.newaxis]
-    points = r**3 * p[:, 0] + 3 * r**2 * s * p[:, 1] + 3 * r * s**2 * p[:, 2] + s**3 * p[:, 3]
-    slopes = 3 * (r**2 * (p[:, 1] - p[:, 0]) + 2 * r * s * (p[:, 2] - p[:, 1]) + s**2 * (p[:, 3] - p[:, 2]))
-    return points, slopes
+def reversed_stages(stages: list[Stage], height: float) -> list[Stage]:
+    """The way back, to a height of the body at its end [m]."""
+    heights = [height, *(stage.height for stage in stages[:-1])]
+    pairs = zip(stages[::-1], heights[::-1], strict=True)
+    return [replace(stage, course=stage.course and stage.course.reversed, height=h) for stage, h in pairs]
 
 
-def path_turn(paths: Array, u: float) -> Array:
-    """By how much curves have turned (k,) from their start to the parameter u [rad]."""
-    return _turning(curve(paths, np.linspace(0.0, max(u, 1e-9), 41))[1])
+def _line(places: tuple[Array, Array], headings: tuple[Array, Array]) -> Course:
+    """Evenly from places (k, 2) and directions (k,) to others."""
+    return Course(contact=np.stack(places), heading=np.stack(headings))
 
 
-def rolling_time(paths: Array) -> float:
-    """Time that the longest of the curves takes [s]."""
-    points, _ = curve(paths, np.linspace(0, 1, 101))
-    lengths = np.sum(np.linalg.norm(np.diff(points, axis=1), axis=-1), axis=1)
-    return float(max(1.0, lengths.max() / ROLL_SPEED))
+def _curve(p: Array, u: Array) -> Array:
+    """Points (m, k, 2) of cubic curves with control points (k, 4, 2) at parameters u (m,)."""
+    s = u[:, np.newaxis, np.newaxis]
+    r = 1 - s
+    points: Array = r**3 * p[:, 0] + 3 * r**2 * s * p[:, 1] + 3 * r * s**2 * p[:, 2] + s**3 * p[:, 3]
+    return points
 
 
-def _turning(slopes: Array) -> Array:
-    angles = np.unwrap(np.arctan2(slopes[..., 1], slopes[..., 0]), axis=1)
-    turned: Array = angles[:, -1] - angles[:, 0]
-    return turned
+def _even(places: Array, count: int = 601) -> Array:
+    """Points (count, k, 2) at even distances along each of k lines (m, k, 2)."""
+    result = np.empty((count, *places.shape[1:]))
+    for leg in range(places.shape[1]):
+        along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(places[:, leg], axis=0), axis=-1))])
+        at = np.linspace(0.0, along[-1], count)
+        for axis in range(2):
+            result[:, leg, axis] = np.interp(at, along, places[:, leg, axis])
+    return result

@@ -44,20 +44,30 @@ GAITS = {
 """The common gaits. Source: McGhee and Frank (1968) for wave gaits; tripod to wave differ in their duty."""
 
 
-def duty(gait: Gait, robot: Robot) -> float:
-    """Share of a period in which a foot is on the ground [-]."""
-    return gait.duty or 1 - 1 / (2 * _legs_per_side(robot))
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Schedule:
+    """A gait of a certain robot.
+
+    Attributes:
+        gait: The gait.
+        duty: Share of a period in which a foot is on the ground [-].
+        phases: Phases (k,) of the legs [-]: a foot lifts when its phase plus time over period passes the duty.
+    """
+
+    gait: Gait
+    duty: float
+    phases: NDArray[np.float64]
 
 
-def phases(gait: Gait, robot: Robot) -> NDArray[np.float64]:
-    """Phases (k,) of the legs at the start of a period [-]: a foot lifts when phase + time / period passes the duty."""
-    lag = gait.lag or duty(gait, robot)
-    result = np.zeros(len(robot.legs))
+def schedule(gait: Gait, robot: Robot) -> Schedule:
+    """A gait of a robot: on each side legs follow one another from the rear, the left side leads."""
+    duty = gait.duty or 1 - 1 / (2 * _legs_per_side(robot))
+    lag, phases = gait.lag or duty, np.zeros(len(robot.legs))
     for side, offset in ((1.0, 0.0), (-1.0, gait.offset)):
         legs = [i for i, leg in enumerate(robot.legs) if math.copysign(1.0, leg.hip[1]) == side]
         for rank, index in enumerate(sorted(legs, key=lambda i: robot.legs[i].hip[0])):
-            result[index] = (rank * lag + offset) % 1.0
-    return np.round(result, 9) % 1.0
+            phases[index] = (rank * lag + offset) % 1.0
+    return Schedule(gait=gait, duty=duty, phases=np.round(phases, 9) % 1.0)
 
 
 def gait_of(name: str) -> Gait:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from rollerbench.description import Posture, Robot
 from rollerbench.description.inertia import GRAVITY
-from rollerbench.description.legs import chain_frames
+from rollerbench.description.legs import chain_links, turned_frames
 from rollerbench.errors import KinematicsError
 
 Array = NDArray[np.float64]
@@ -28,11 +28,13 @@ class Hold:
         values: What rows @ q shall be (k,) [rad]; where heading is set, the direction in which the wheel rolls ahead,
             from B's x axis about its z axis [rad].
         heading: Whether the wheel's direction is held instead (k,).
+        near: Joint angles (k, n) near which a solution is sought [rad].
     """
 
     rows: Array
     values: Array
     heading: NDArray[np.bool_]
+    near: Array
 
 
 class LegGroup:
@@ -55,17 +57,18 @@ class LegGroup:
         self.shape = (count, joints)
         self.wheel_radius = np.array([leg.wheel.radius for leg in robot.legs])
         self.present = np.zeros((count, joints), dtype=bool)
-        self._rows, self._limits = np.zeros((count, joints, 4)), np.zeros((count, 2, joints))
+        rows, self._limits = np.zeros((count, joints, 4)), np.zeros((count, 2, joints))
         self._mass, self._com = np.zeros((count, joints + 1)), np.zeros((count, joints + 1, 3))
         self._X_BL = np.array([leg.X_BL for leg in robot.legs])
         self._length = float(np.mean([leg.length for leg in robot.legs]))
         for index, leg in enumerate(robot.legs):
             own = len(leg.links)
             self.present[index, :own] = True
-            self._rows[index, :own], self._limits[index, :, :own] = leg.rows, leg.limits
+            rows[index, :own], self._limits[index, :, :own] = leg.rows, leg.limits
             parts = [link.inertia for link in leg.links]
             self._mass[index, :own], self._com[index, :own] = [p.mass for p in parts], [p.com for p in parts]
             self._mass[index, -1] = leg.wheel.mass
+        self._links, self._offsets = chain_links(rows), rows[..., 3]
         self._body = (robot.body.mass, np.array(robot.body.center_of_mass))
 
     @property
@@ -87,11 +90,11 @@ class LegGroup:
             rows[:, 1:3] = 1.0
         elif posture.held_joint is not None:
             rows[:, posture.held_joint] = 1.0
-        return Hold(rows=rows, values=np.sum(rows * q, axis=1), heading=np.zeros(len(q), dtype=bool))
+        return Hold(rows=rows, values=np.sum(rows * q, axis=1), heading=np.zeros(len(q), dtype=bool), near=q)
 
     def frames(self, q: Array) -> Array:
         """Poses (k, n + 1, 4, 4) in B of the joints' frames and of the feet at joint angles (k, n)."""
-        frames: Array = self._X_BL[:, np.newaxis] @ chain_frames(self._rows, q)
+        frames: Array = self._X_BL[:, np.newaxis] @ turned_frames(self._links, q + self._offsets)
         return frames
 
     def jacobian(self, frames: Array) -> Array:
@@ -106,9 +109,9 @@ class LegGroup:
         return np.arctan2(-axle[:, 0], axle[:, 1])
 
     def inverse(
-        self, p_BF: Array, hold: Hold, q: Array, *, iterations: int = 2, tolerance: float = 1e-10
+        self, p_BF: Array, hold: Hold, *, iterations: int = 2, tolerance: float = 1e-9
     ) -> tuple[Array, Array, Array]:
-        """Joint angles that put the feet's centres at p_BF (k, 3), near joint angles q (k, n).
+        """Joint angles that put the feet's centres at p_BF (k, 3).
 
         Damped Gauss-Newton steps. From one period of a controller to the next two of them suffice; for far targets
         allow more. The joints' limits are not considered.
@@ -116,7 +119,7 @@ class LegGroup:
         Returns:
             Joint angles (k, n), their `frames`, and the distances (k,) by which the feet miss [m].
         """
-        scale, frames = self._length, self.frames(q)
+        scale, q, frames = self._length, hold.near, self.frames(hold.near)
         for _ in range(iterations):
             error = p_BF - frames[:, -1, :3, 3]
             matrix = np.concatenate([self.jacobian(frames)[:, 3:], np.zeros((len(q), 1, q.shape[1]))], axis=1)
@@ -200,11 +203,8 @@ class LegGroup:
 
 def _cross(a: Array, b: Array) -> Array:
     """Cross product over the last axis; numpy's own is slower on small arrays."""
-    return np.stack(
-        [
-            a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1],
-            a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2],
-            a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0],
-        ],
-        axis=-1,
-    )
+    ax, ay, az, bx, by, bz = a[..., 0], a[..., 1], a[..., 2], b[..., 0], b[..., 1], b[..., 2]
+    x = ay * bz - az * by
+    product = np.empty((*x.shape, 3))
+    product[..., 0], product[..., 1], product[..., 2] = x, az * bx - ax * bz, ax * by - ay * bx
+    return product

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from rollerbench.description import Posture
 from rollerbench.kinematics.legs.changes import Change
-from rollerbench.kinematics.legs.gaits import Gait
+from rollerbench.kinematics.legs.gaits import Gait, Schedule
 from rollerbench.kinematics.legs.group import Hold
 from rollerbench.kinematics.legs.smooth import Follower
 from rollerbench.kinematics.legs.wheeling import Wheeling
@@ -56,6 +56,7 @@ class LegFeedback:
 
     Attributes:
         q: Joint angles (k, n) that the legs are at [rad].
+        q_rate: Joint speeds (k, n) at which they got there [rad/s].
         roll_P: Displacements (k, 3) by which feet on the ground rolled sideways, as their legs leaned, since the last
             plan, in P [m].
         loads: Measured loads (k,) of the feet [N]; None where nobody measures, and the ground is taken to be level.
@@ -63,6 +64,7 @@ class LegFeedback:
     """
 
     q: Array
+    q_rate: Array
     roll_P: Array
     loads: Array | None = None
     fault: str = ""
@@ -84,7 +86,7 @@ class LegPlan:
         lifted_P: Where legs in the air left the ground (k, 3) [m].
         load: Shares (k,) of its load that a foot bears, from 0 in the air to 1.
         phase: Where in its period the gait is, from 0 to 1.
-        gait: The gait.
+        schedule: The gait.
         posture: The posture that it stands in, or leaves.
         hold: What settles the joints that the feet leave free.
         activity: What the robot does.
@@ -106,7 +108,7 @@ class LegPlan:
     lifted_P: Array
     load: Array
     phase: float
-    gait: Gait
+    schedule: Schedule
     posture: Posture
     hold: Hold
     activity: Activity = "walk"

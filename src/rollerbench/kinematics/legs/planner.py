@@ -9,7 +9,7 @@ from rollerbench.description import Robot
 from rollerbench.errors import KinematicsError
 from rollerbench.kinematics import odometry
 from rollerbench.kinematics.legs import changes, wheeling
-from rollerbench.kinematics.legs.gaits import Gait, duty, gait_of, phases
+from rollerbench.kinematics.legs.gaits import Gait, Schedule, gait_of, schedule
 from rollerbench.kinematics.legs.group import Hold, LegGroup
 from rollerbench.kinematics.legs.plan import LegCommand, LegFeedback, LegMode, LegPlan
 from rollerbench.kinematics.legs.smooth import Follower, bump, quintic
@@ -47,6 +47,9 @@ SINK_SPEED = 0.1
 SINK_DEPTH = 0.06
 """How far below the expected ground feet look for it [m]."""
 
+WOUND_UP = 0.25
+"""Joints this close to their limits end a drive, until the legs have stepped back into their posture [rad]."""
+
 REACH_TOLERANCE = 1e-4
 """Feet this close to their targets count as there [m]."""
 
@@ -65,8 +68,13 @@ class LegPlanner:
         self._holds = {name: self.group.hold(posture, self._q[name]) for name, posture in self.postures.items()}
         centers = {name: robot.feet_B(name) for name in self.postures}
         self._home = {name: feet[:, :2] for name, feet in centers.items()}
+        self._heading = {name: self.group.headings(self.group.frames(q)) for name, q in self._q.items()}
         radius = self.group.wheel_radius
         self._height = {name: float(np.mean(radius - feet[:, 2])) for name, feet in centers.items()}
+        # Joints that a posture has near a limit do not steer.
+        low, high = self.group.limits
+        angles = np.array(list(self._q.values()))
+        self._turning = ((angles > low + 1.0) & (angles < high - 1.0)).all(axis=0)
         self._contact_load = CONTACT_SHARE * robot.mass * 9.81 / len(robot.legs)
 
     def home(self, posture: str) -> Array:
@@ -99,7 +107,7 @@ class LegPlanner:
             lifted_P=feet,
             load=np.ones(count),
             phase=0.0,
-            gait=_gait(mode),
+            schedule=schedule(_gait(mode), self.robot),
             posture=self.postures[mode.posture],
             hold=self._holds[mode.posture],
             request=np.zeros(3),
@@ -131,9 +139,9 @@ class LegPlanner:
 
     def advance(self, plan: LegPlan, dt: float, command: LegCommand, feedback: LegFeedback) -> LegPlan:
         """The plan a moment dt later [s]."""
-        plan = self._moved(plan, feedback)
+        plan = self._moved(plan, dt, feedback)
         plan = self._turned_to(plan, command, feedback)
-        plan = self._accepting(plan, command)
+        plan = self._accepting(plan, command, feedback)
         twist = plan.twist.follow(plan.accepted, dt, TWIST_TIME)
         mean = 0.5 * (plan.twist.value + twist.value)
         wanted = command.offset if plan.activity in ("walk", "drive") else 0.0 * command.offset
@@ -157,9 +165,10 @@ class LegPlanner:
         ground = plan.feet_P[on_ground, 2].mean(keepdims=True) if on_ground.any() else plan.ground.value
         return replace(plan, ground=plan.ground.follow(ground, dt, GROUND_TIME))
 
-    def _moved(self, plan: LegPlan, feedback: LegFeedback) -> LegPlan:
+    def _moved(self, plan: LegPlan, dt: float, feedback: LegFeedback) -> LegPlan:
         on_ground = (plan.swing < 0)[:, np.newaxis]
-        return replace(plan, feet_P=np.where(on_ground, plan.feet_P + feedback.roll_P, plan.feet_P))
+        feet = np.where(on_ground, plan.feet_P + feedback.roll_P, plan.feet_P)
+        return replace(plan, feet_P=feet, hold=replace(plan.hold, near=feedback.q + dt * feedback.q_rate))
 
     # What to do.
 
@@ -175,7 +184,7 @@ class LegPlanner:
         away = self._away(plan).any()
         here = mode.posture == plan.posture.name
         if plan.activity == "drive":
-            if here and mode.motion == "drive":
+            if here and mode.motion == "drive" and not (plan.wheeling and plan.wheeling.wound_up):
                 return plan
             return self._begin_change(plan, mode if not here else replace(mode, change="stepping"), feedback)
         if not here and not away and not plan.offset.value.any():
@@ -183,28 +192,31 @@ class LegPlanner:
         if here and mode.motion == "drive":
             return self._begin_drive(plan, feedback)
         gait = _gait(mode)
-        if here and gait != plan.gait and not away:
-            return replace(plan, gait=gait, phase=0.0)
+        if here and gait != plan.schedule.gait and not away:
+            return replace(plan, schedule=schedule(gait, self.robot))
         return plan
 
-    def _accepting(self, plan: LegPlan, command: LegCommand) -> LegPlan:
+    def _accepting(self, plan: LegPlan, command: LegCommand, feedback: LegFeedback) -> LegPlan:
         """The plan with the twist that it may follow now."""
         mode, request = command.mode, command.v_xyw_B
         follows = plan.activity == mode.motion and mode.posture == plan.posture.name
         if plan.activity == "walk":
-            follows &= _gait(mode) == plan.gait
+            follows &= _gait(mode) == plan.schedule.gait
         if not follows or not request.any():
             return replace(plan, accepted=np.zeros(3), request=np.zeros(3))
         if plan.activity == "drive":
-            ready = plan.wheeling is not None and (not plan.at_rest or wheeling.aligned(plan.wheeling, request))
+            assert plan.wheeling is not None
+            wound_up = plan.wheeling.wound_up or self._wound_up(plan.wheeling, feedback.q)
+            ready = not wound_up and (not plan.at_rest or wheeling.aligned(plan.wheeling, request))
+            plan = replace(plan, wheeling=replace(plan.wheeling, wound_up=wound_up))
             return replace(plan, accepted=request if ready else np.zeros(3), request=request, status="")
         if np.array_equal(request, plan.request):
             return plan
-        share = self.reachable_share(plan.posture.name, plan.gait, request, plan.offset.value)
+        share = self.reachable_share(plan.posture.name, plan.schedule, request, plan.offset.value)
         status = "" if share == 1 else f"the command is beyond the legs' reach; followed at {share:.0%}"
         return replace(plan, request=request, accepted=share * request, status=status)
 
-    def reachable_share(self, posture: str, gait: Gait, v_xyw_B: Array, offset: Array | None = None) -> float:
+    def reachable_share(self, posture: str, gait: Schedule, v_xyw_B: Array, offset: Array | None = None) -> float:
         """The largest share, up to 1, of a twist (3,) at which all feet reach where a gait puts them."""
         if self._reaches(posture, gait, v_xyw_B, offset):
             return 1.0
@@ -214,11 +226,11 @@ class LegPlanner:
             low, high = (middle, high) if self._reaches(posture, gait, middle * v_xyw_B, offset) else (low, middle)
         return low
 
-    def _reaches(self, posture: str, gait: Gait, v_xyw_B: Array, offset: Array | None) -> bool:
+    def _reaches(self, posture: str, gait: Schedule, v_xyw_B: Array, offset: Array | None) -> bool:
         """Whether feet reach both ends of their strides, and lift in the middle."""
-        half = 0.5 * duty(gait, self.robot) * gait.period
+        half = 0.5 * gait.duty * gait.gait.period
         home, radius = self._home[posture], self.group.wheel_radius
-        for time, lift in ((-half, 0.0), (-0.5 * half, 0.0), (0.0, gait.lift), (0.5 * half, 0.0), (half, 0.0)):
+        for time, lift in ((-half, 0.0), (-0.5 * half, 0.0), (0.0, gait.gait.lift), (0.5 * half, 0.0), (half, 0.0)):
             x, y, yaw = odometry.integrate(np.zeros(3), -v_xyw_B, time)
             cos, sin = np.cos(yaw), np.sin(yaw)
             feet = home @ np.array([[cos, sin], [-sin, cos]]) + [x, y]
@@ -232,7 +244,7 @@ class LegPlanner:
 
     def solve(self, posture: str, centers_B: Array) -> tuple[Array, bool]:
         """Joint angles (k, n) of a posture with the feet's centres elsewhere (k, 3), and whether the legs reach."""
-        q, _, missed = self.group.inverse(centers_B, self._holds[posture], self._q[posture], iterations=25)
+        q, _, missed = self.group.inverse(centers_B, self._holds[posture], iterations=25)
         return q, bool(missed.max() < REACH_TOLERANCE and not self.group.beyond_limits(q).any())
 
     # Walking.
@@ -243,7 +255,7 @@ class LegPlanner:
         return np.hypot(*(plan.feet_P[:, :2] - place).T) > HOME_TOLERANCE
 
     def _walk(self, plan: LegPlan, dt: float, feedback: LegFeedback) -> LegPlan:
-        gait, share = plan.gait, duty(plan.gait, self.robot)
+        gait, share = plan.schedule.gait, plan.schedule.duty
         step = dt / gait.period
         away = self._away(plan)
         moving = bool(plan.twist.value.any() or plan.accepted.any())
@@ -251,7 +263,7 @@ class LegPlanner:
         if not moving and not away.any() and plan.at_rest:
             load = np.minimum(1.0, plan.load + step / LOAD_RAMP)
             return replace(plan, phase=share - LOAD_RAMP, load=load, hold=posture)
-        local = (plan.phase + phases(gait, self.robot)) % 1.0
+        local = (plan.phase + plan.schedule.phases) % 1.0
         lifts = (plan.swing < 0) & (local < share) & (local + step >= share) & (moving | away)
         on_ground = (plan.swing < 0) & ~lifts
         swing = np.where(lifts, 0.0, plan.swing)
@@ -271,16 +283,18 @@ class LegPlanner:
 
     def _swung(self, plan: LegPlan, dt: float, feedback: LegFeedback) -> tuple[Array, Array]:
         """Feet (k, 3) and progress (k,) of the swing a moment later."""
-        share, period = duty(plan.gait, self.robot), plan.gait.period
-        time = (1 - share) * period
+        gait, share = plan.schedule.gait, plan.schedule.duty
+        time = (1 - share) * gait.period
+        if (plan.swing < 0).all():
+            return plan.feet_P, plan.swing
         u = np.where(plan.swing >= 0, plan.swing + dt / time, -1.0)
         # In the middle of the next stance the foot is where the posture has it.
-        ahead = np.maximum(0.0, 1 - u) * time + 0.5 * share * period
+        ahead = np.maximum(0.0, 1 - u) * time + 0.5 * share * gait.period
         body = odometry.integrate(plan.q_xyt, plan.twist.value * ahead[:, np.newaxis], 1.0)
         target = _placed(body, self._home[plan.posture.name])
         s = quintic(u)[:, np.newaxis]
         flat = (1 - s) * plan.lifted_P[:, :2] + s * target
-        height = plan.lifted_P[:, 2] + plan.gait.lift * bump(u)
+        height = plan.lifted_P[:, 2] + gait.lift * bump(u)
         landed = u >= 1 - 1e-9
         if feedback.loads is not None:
             touches = (feedback.loads > self._contact_load) & (u > 0.5)
@@ -297,19 +311,16 @@ class LegPlanner:
     def _settled_hold(self, plan: LegPlan, dt: float) -> Hold:
         """What the posture holds, on its way back to its value."""
         nominal = self._holds[plan.posture.name]
-        if plan.hold is nominal:
-            return nominal
         off = nominal.values - plan.hold.values
-        if plan.hold.heading.any() or np.abs(off).max() < 1e-9:
-            return nominal
-        return replace(nominal, values=plan.hold.values + np.clip(off, -HOLD_RATE * dt, HOLD_RATE * dt))
+        values = plan.hold.values + np.clip(off, -HOLD_RATE * dt, HOLD_RATE * dt)
+        return replace(nominal, values=values, near=plan.hold.near)
 
     def _sink(self, plan: LegPlan, dt: float) -> LegPlan:
         """Feet in the air go down where they are, and the robot stands."""
         feet, flying = plan.feet_P.copy(), plan.swing >= 0
         feet[flying, 2] = np.maximum(plan.lifted_P[flying, 2], feet[flying, 2] - SINK_SPEED * dt)
         swing = np.where(flying & (feet[:, 2] <= plan.lifted_P[:, 2]), -1.0, plan.swing)
-        load = np.where(swing < 0, np.minimum(1.0, plan.load + dt / (LOAD_RAMP * plan.gait.period)), 0.0)
+        load = np.where(swing < 0, np.minimum(1.0, plan.load + dt / (LOAD_RAMP * plan.schedule.gait.period)), 0.0)
         return replace(plan, feet_P=feet, swing=swing, load=load)
 
     # Driving.
@@ -330,49 +341,73 @@ class LegPlanner:
         hold = replace(plan.hold, values=now.heading, heading=np.ones(len(feet), dtype=bool))
         return replace(plan, wheeling=now, feet_P=feet, hold=hold)
 
+    def _wound_up(self, now: wheeling.Wheeling, q: Array) -> bool:
+        """Whether a joint has turned so far while driving that the legs have to step back into their posture."""
+        low, high = self.group.limits
+        # A castor swings on while the robot comes to rest.
+        margin = WOUND_UP + np.where(now.castor, 2 * TWIST_TIME * np.abs(now.rate), 0.0)[:, np.newaxis]
+        near = (q < low + margin) | (q > high - margin)
+        return bool((near & (self._turning & self.group.present)).any())
+
     # Changing the posture.
 
     def _begin_change(self, plan: LegPlan, mode: LegMode, feedback: LegFeedback) -> LegPlan:
         name, q = mode.posture, feedback.q
-        frames = self.group.frames(q)
-        contact = _seen_from(plan.q_xyt, plan.feet_P[:, :2])
-        end_height = self._height[name]
         change = changes.Change(
             posture=self.postures[name],
             stages=(),
             height=plan.height,
             q_from=q,
             q_to=self._q[name],
-            paths=np.repeat(contact[:, np.newaxis], 4, axis=1),
-            headings=self.group.headings(frames),
+            contact=_seen_from(plan.q_xyt, plan.feet_P[:, :2]),
+            heading=self.group.headings(self.group.frames(q)),
         )
         if mode.change == "rolling":
-            turn = self._turn(q, self._q[name])
-            ends = (change.headings, self.group.headings(self.group.frames(self._q[name])))
-            paths = changes.rolling_paths(contact, self._home[name], ends, turn)
-            every = np.ones(len(q), dtype=bool)
-            stage = changes.Stage(kind="roll", duration=changes.rolling_time(paths), height=end_height, legs=every)
-            change = replace(change, stages=(stage,), paths=paths)
+            stages = self._rolling(plan.posture.name, name)
         else:
-            low = min(plan.height, end_height)
-            order = phases(_gait(mode), self.robot)
+            low = min(plan.height, self._height[name])
+            order = schedule(_gait(mode), self.robot).phases
             groups = [np.isclose(order, phase) for phase in np.unique(order)]
-            stages = changes.stepping_stages(plan.height, low, end_height, groups)
-            change = replace(change, stages=tuple(stages), q_to=self._lowered(name, low))
-        return replace(plan, activity="change", change=change, wheeling=None, gait=_gait(mode))
+            stages = changes.stepping_stages(plan.height, low, self._height[name], groups)
+            change = replace(change, q_to=self._lowered(name, low))
+        change = self._prepared(replace(change, stages=tuple(stages)), plan)
+        return replace(
+            plan, activity="change", change=change, wheeling=None, schedule=schedule(_gait(mode), self.robot)
+        )
 
-    def _turn(self, q: Array, to: Array) -> Array:
-        """By how much wheels turn (k,) as their joints go evenly from q to other angles (k, n) [rad]."""
-        headings = [self.group.headings(self.group.frames(q + s * (to - q))) for s in np.linspace(0, 1, 61)]
-        turned: Array = np.unwrap(headings, axis=0)
-        return turned[-1] - turned[0]
+    def _prepared(self, change: changes.Change, plan: LegPlan) -> changes.Change:
+        """The change with the path of the legs that step in its present stage."""
+        if change.stages[0].kind != "step":
+            return replace(change, steps=None)
+        q_to = np.where(change.stages[0].legs[:, np.newaxis], change.q_to, change.q_from)
+        steps = changes.stepping_path(self.group, change.q_from, q_to, plan.X_PB, plan.schedule.gait.lift)
+        return replace(change, steps=steps)
+
+    def _rolling(self, start: str, end: str) -> list[changes.Stage]:
+        """Stages in which wheels roll from one posture to another, of which one has its feet under the hips."""
+        hips = np.array([leg.hip[:2] for leg in self.robot.legs])
+        under = [name for name in (start, end) if self._under_hips(name)]
+        if len(under) != 1:
+            raise KinematicsError(
+                f"from {start} to {end} no wheel can roll: accepted: rolling between a posture with the feet under the "
+                "hips and one with the feet beside them, or stepping"
+            )
+        inner, outer = under[0], start if under[0] == end else end
+        places = [(self._home[name], self._heading[name]) for name in (outer, inner)]
+        heights = (self._height[outer], self._height[inner])
+        stages = changes.rolling_stages(places[0], places[1], hips, heights)
+        return stages if inner == end else changes.reversed_stages(stages, heights[0])
+
+    def _under_hips(self, posture: str) -> bool:
+        away = self._home[posture] - [leg.hip[:2] for leg in self.robot.legs]
+        return bool((np.hypot(*away.T) < changes.UNDER_HIP).all())
 
     def _lowered(self, posture: str, height: float) -> Array:
         """Joint angles (k, n) of a posture with the body at another height [m], reached on the way there."""
         q, radius = self._q[posture], self.group.wheel_radius
         for h in np.linspace(self._height[posture], height, 25)[1:]:
             centers = np.column_stack([self._home[posture], radius - h])
-            q, _, _ = self.group.inverse(centers, self._holds[posture], q, iterations=8)
+            q, _, _ = self.group.inverse(centers, replace(self._holds[posture], near=q), iterations=8)
         return q
 
     def _change(self, plan: LegPlan, dt: float) -> LegPlan:
@@ -396,24 +431,33 @@ class LegPlanner:
         hold = plan.hold
         if change.stages[0].kind == "roll":
             rows = self._holds[change.posture.name].rows
-            hold = Hold(rows=rows, values=np.sum(rows * q, axis=1), heading=np.zeros(len(q), dtype=bool))
-        change = change.next_stage(q, plan.height)
-        if change.stages:
-            return replace(plan, change=change, hold=hold)
+            hold = Hold(rows=rows, values=np.sum(rows * q, axis=1), heading=np.zeros(len(q), dtype=bool), near=q)
+        if len(change.stages) > 1:
+            change = replace(
+                change,
+                stages=change.stages[1:],
+                elapsed=0.0,
+                height=plan.height,
+                q_from=q,
+                contact=_seen_from(plan.q_xyt, plan.feet_P[:, :2]),
+                heading=self.group.headings(self.group.frames(q)),
+            )
+            return replace(plan, change=self._prepared(change, plan), hold=hold)
         return replace(plan, change=None, hold=hold, activity="walk", posture=change.posture)
 
     def _stepped(self, plan: LegPlan, change: changes.Change, dt: float) -> LegPlan:
-        legs, u = change.stages[0].legs, change.linear
-        q = change.q_from + change.progress * (change.q_to - change.q_from)
-        pose = plan.X_PB
+        legs, u, pose = change.stages[0].legs, change.linear, plan.X_PB
+        assert change.steps is not None
+        q = np.clip(change.steps(change.progress), *self.group.limits)
         centers = self.group.frames(q)[:, -1, :3, 3] @ pose[:3, :3].T + pose[:3, 3]
-        centers[:, 2] += plan.gait.lift * bump(u) - self.group.wheel_radius
+        centers[:, 2] -= self.group.wheel_radius
         flying = legs[:, np.newaxis]
         target = self._holds[change.posture.name]
         hold = Hold(
             rows=np.where(flying, target.rows, plan.hold.rows),
             values=np.where(legs, np.sum(target.rows * q, axis=1), plan.hold.values),
             heading=plan.hold.heading & ~legs,
+            near=np.where(flying, q, plan.hold.near),
         )
         landed = u >= 1 - 1e-9
         return replace(
@@ -425,12 +469,22 @@ class LegPlanner:
         )
 
     def _rolled(self, plan: LegPlan, change: changes.Change) -> LegPlan:
-        u = change.progress
-        points, _ = changes.curve(change.paths, np.array([u]))
-        heading = change.headings + changes.path_turn(change.paths, u)
-        feet = np.column_stack([_placed(plan.q_xyt, points[:, 0]), plan.feet_P[:, 2]])
-        hold = replace(plan.hold, values=heading, heading=np.ones(len(feet), dtype=bool))
-        return replace(plan, feet_P=feet, hold=hold)
+        s, course = change.progress, change.stages[0].course
+        assert course is not None
+        # What the feet were off at the start fades away on the way.
+        first, last = course.at(0.0), course.at(s)
+        off = change.heading - first[1]
+        contact = last[0] + (1 - s) * (change.contact - first[0])
+        heading = last[1] + (1 - s) * np.arctan2(np.sin(off), np.cos(off))
+        feet = np.column_stack([_placed(plan.q_xyt, contact), plan.feet_P[:, 2]])
+        rows, headings = np.zeros(self.group.shape), np.full(len(feet), not change.stages[0].straight)
+        if change.stages[0].straight:
+            last = np.array([len(leg.links) - 1 for leg in self.robot.legs])
+            rows[range(len(last)), last] = 1.0
+            inner = next(name for name in (change.posture.name, plan.posture.name) if self._under_hips(name))
+            begun = change.q_from[range(len(last)), last]
+            heading = begun + s * (self._q[inner][range(len(last)), last] - begun)
+        return replace(plan, feet_P=feet, hold=replace(plan.hold, rows=rows, values=heading, heading=headings))
 
 
 def _gait(mode: LegMode) -> Gait:
@@ -439,7 +493,7 @@ def _gait(mode: LegMode) -> Gait:
 
 def _placed(q_xyt: Array, points: Array) -> Array:
     """Points (k, 2) of B in P, at poses (3,) or (k, 3)."""
-    x, y, yaw = np.moveaxis(q_xyt, -1, 0)
+    x, y, yaw = q_xyt[..., 0], q_xyt[..., 1], q_xyt[..., 2]
     cos, sin = np.cos(yaw), np.sin(yaw)
     return np.stack([x + cos * points[:, 0] - sin * points[:, 1], y + sin * points[:, 0] + cos * points[:, 1]], axis=-1)
 

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from rollerbench.kinematics.legs.group import Hold, LegGroup
 
@@ -44,7 +43,7 @@ def track(
     q: Array,
     wheel: Array,
     poses: tuple[Array, Array],
-    p_BF: Array,
+    places: tuple[Array, Array],
     hold: Hold,
     stance: Array,
     dt: float,
@@ -58,22 +57,26 @@ def track(
         q: Joint angles (k, n) now [rad].
         wheel: Angles (k,) of the wheels now [rad].
         poses: Poses (4, 4) of the body in P now and a period later.
-        p_BF: Places (k, 3) of the feet's centres a period later, in B [m].
+        places: Places (k, 3) of the feet's centres in B now and a period later [m].
         hold: What settles the joints that the feet leave free, a period later.
         stance: Which feet (k,) are on the ground, and roll; the other wheels stand still.
         dt: The period [s].
     """
     still = np.zeros(len(q))
-    target, frames, missed = group.inverse(p_BF, hold, q)
+    target, frames, missed = group.inverse(places[1], hold, tolerance=1e-7)
     fault = _fault(group, target, missed)
     if fault:
         return Tracked(q=q, wheel=wheel, q_rate=0 * q, wheel_rate=still, roll_P=np.zeros((len(q), 3)), fault=fault)
     rate = (target - q) / dt
     before, after = poses
-    turn = Rotation.from_matrix(before[:3, :3].T @ after[:3, :3]).as_rotvec() / dt
-    spin = turn + (group.jacobian(frames)[:, :3] @ rate[..., np.newaxis])[..., 0]
-    centers = p_BF @ after[:3, :3].T + after[:3, 3]
-    previous = group.frames(q)[:, -1, :3, 3] @ before[:3, :3].T + before[:3, 3]
+    # For the small turns of one period, half of the skew part is the rotation vector.
+    turned = before[:3, :3].T @ after[:3, :3]
+    skew = turned - turned.T
+    spin = (
+        np.array([skew[2, 1], skew[0, 2], skew[1, 0]]) / (2 * dt)
+        + (group.jacobian(frames)[:, :3] @ rate[..., np.newaxis])[..., 0]
+    )
+    previous, centers = (place @ pose[:3, :3].T + pose[:3, 3] for place, pose in zip(places, poses, strict=True))
     velocity = (centers - previous) @ after[:3, :3] / dt
     speed, across = group.rolling(frames, spin, velocity, after[2, :3])
     roll = dt * across @ after[:3, :3].T * stance[:, np.newaxis]

@@ -34,6 +34,8 @@ class Wheeling:
         bearing: Directions (k,) from the axes to the feet [rad].
         contact: Where the feet are (k, 2) [m].
         heading: Directions (k,) in which the wheels roll ahead [rad].
+        rate: How fast these turn (k,) [rad/s].
+        wound_up: Whether a leg has turned so far that the drive has to be interrupted.
     """
 
     castor: NDArray[np.bool_]
@@ -42,6 +44,8 @@ class Wheeling:
     bearing: Array
     contact: Array
     heading: Array
+    rate: Array
+    wound_up: bool = False
 
 
 def wheeling_from(contact: Array, heading: Array, pivot: Array, upright: Array) -> Wheeling:
@@ -57,7 +61,9 @@ def wheeling_from(contact: Array, heading: Array, pivot: Array, upright: Array) 
     trail = np.hypot(*arm.T)
     bearing = np.arctan2(arm[:, 1], arm[:, 0])
     castor = (np.abs(upright) > UPRIGHT) & (trail > LEAST_TRAIL)
-    return Wheeling(castor=castor, pivot=pivot, trail=trail, bearing=bearing, contact=contact, heading=heading)
+    return Wheeling(
+        castor=castor, pivot=pivot, trail=trail, bearing=bearing, contact=contact, heading=heading, rate=0 * heading
+    )
 
 
 def aligned(wheeling: Wheeling, v_xyw_B: Array) -> bool:
@@ -94,8 +100,9 @@ def advanced(wheeling: Wheeling, v_xyw_B: Array, steer_to: Array, dt: float) -> 
     velocity = _velocity(wheeling.contact, steer_to)
     off = _to_line(np.arctan2(velocity[:, 1], velocity[:, 0]) - wheeling.heading)
     steering = np.clip(off, -STEERING_SPEED * dt, STEERING_SPEED * dt)
-    steering = np.where(wheeling.castor | (np.hypot(*velocity.T) <= STANDSTILL), 0.0, steering)
-    return replace(wheeling, bearing=bearing, contact=contact, heading=wheeling.heading + turned + steering)
+    steering = np.where(wheeling.castor | wheeling.wound_up | (np.hypot(*velocity.T) <= STANDSTILL), 0.0, steering)
+    turned = turned + steering
+    return replace(wheeling, bearing=bearing, contact=contact, heading=wheeling.heading + turned, rate=turned / dt)
 
 
 def _velocity(points: Array, v_xyw_B: Array) -> Array:
