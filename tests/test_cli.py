@@ -133,7 +133,8 @@ def test_build_writes_the_model_beside_the_description(tmp_path: Path) -> None:
 def test_the_schema_accepts_what_is_shipped() -> None:
     schema = json.loads(rollerbench("schema").stdout)
     assert schema["title"] == "Robot"
-    assert "wheels" in schema["required"]
+    assert {"name", "body"} == set(schema["required"])
+    assert {"wheels", "legs"} <= set(schema["properties"])
     assert "command" in json.loads(rollerbench("schema", "--scenario").stdout)["required"]
 
 

@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rollerbench.analysis.limits import STEPS, Capability, capability
-from rollerbench.description import Robot, load_robot
+from rollerbench.description import Robot
 from rollerbench.description.files import write_atomically
 from rollerbench.errors import ResourceError
 from rollerbench.kinematics.limits import Limit
+from rollerbench.kinematics.rows import wheeled
 from rollerbench.report.analysis import analysis_page
 from rollerbench.report.limits import Measured, limit_figures
 from rollerbench.simulation.log import versions
@@ -61,9 +62,9 @@ def analyze(
 
     Raises:
         ResourceError: there is no such robot, or the folder cannot be written or holds something else.
-        KinematicsError: an argument is malformed.
+        KinematicsError: an argument is malformed, or the robot stands on legs.
     """
-    loaded = load_robot(robot)
+    loaded = wheeled(robot)
     folder = Path("analyses") / loaded.name if output is None else Path(output)
     earlier = claim(
         folder, files={"analysis.json", "report.html"}, folders={"figures"}, index="analysis.json", what="analysis"
