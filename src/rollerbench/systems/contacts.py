@@ -38,7 +38,7 @@ class SlipMonitor(LeafSystem):
         super().__init__()
         self._wheel_of = _wheel_of_body(model)
         self._contacts = self.DeclareAbstractInputPort("contact_results", Value(ContactResults()))
-        count = len(model.robot.wheels)
+        count = len(model.robot.wheels or model.robot.legs)
         self.DeclareVectorOutputPort("slip_speeds", count, self._calc_slip)
         self.DeclareVectorOutputPort("normal_forces", count, self._calc_loads)
 
@@ -113,11 +113,12 @@ class RollResistance(LeafSystem):
 
 
 def _wheel_of_body(model: RobotModel) -> dict[int, int]:
-    """Indices of the wheels by those of their hubs and rollers."""
+    """Indices of the wheels, or feet, by those of their hubs and rollers."""
     found = {}
     for index, wheel in enumerate(model.robot.wheels):
         for joint in (model.drive_joint(wheel), *model.roller_joints(wheel)):
             found[int(joint.child_body().index())] = index
+    found |= {int(model.foot_body(leg).index()): index for index, leg in enumerate(model.robot.legs)}
     return found
 
 

@@ -68,7 +68,9 @@ class LegGroup:
             parts = [link.inertia for link in leg.links]
             self._mass[index, :own], self._com[index, :own] = [p.mass for p in parts], [p.com for p in parts]
             self._mass[index, -1] = leg.wheel.mass
+        self._in_vector = np.hstack([self.present, np.ones((count, 1), dtype=bool)])
         self._links, self._offsets = chain_links(rows), rows[..., 3]
+        self._total = float(self._mass.sum()) + robot.body.mass
         self._body = (robot.body.mass, np.array(robot.body.center_of_mass))
 
     @property
@@ -91,6 +93,17 @@ class LegGroup:
         elif posture.held_joint is not None:
             rows[:, posture.held_joint] = 1.0
         return Hold(rows=rows, values=np.sum(rows * q, axis=1), heading=np.zeros(len(q), dtype=bool), near=q)
+
+    def to_vector(self, joints: Array, wheels: Array) -> Array:
+        """Values of joints (k, n) and of wheels (k,) in one vector, leg by leg, each leg's wheel after its joints."""
+        every = np.concatenate([joints, wheels[:, np.newaxis]], axis=1)
+        return every[self._in_vector]
+
+    def from_vector(self, vector: Array) -> tuple[Array, Array]:
+        """Values of joints (k, n) and of wheels (k,) from such a vector."""
+        every = np.zeros((self.shape[0], self.shape[1] + 1))
+        every[self._in_vector] = vector
+        return every[:, :-1], every[:, -1]
 
     def frames(self, q: Array) -> Array:
         """Poses (k, n + 1, 4, 4) in B of the joints' frames and of the feet at joint angles (k, n)."""
@@ -159,7 +172,7 @@ class LegGroup:
         """Centre of mass (3,) of the whole robot in B [m]."""
         places = frames[..., :3, 3] + (frames[..., :3, :3] @ self._com[..., np.newaxis])[..., 0]
         moment = np.einsum("km,kmx->x", self._mass, places) + self._body[0] * self._body[1]
-        return moment / (self._mass.sum() + self._body[0])
+        return moment / self._total
 
     def gravity_efforts(self, frames: Array, up_B: Array) -> Array:
         """Torques (k, n) with which the joints carry the legs' own weight [N m].
@@ -174,6 +187,42 @@ class LegGroup:
         arms = moment[:, :-1] - mass[:, :-1, np.newaxis] * frames[:, :-1, :3, 3]
         # A torque about z_i holds what gravity -g up turns: tau = g z . (arm x up).
         return GRAVITY * np.einsum("knx,knx->kn", frames[:, :-1, :3, 2], _cross(arms, up_B)) * self.present
+
+    def contact_efforts(self, frames: Array, forces: Array, up_B: Array) -> tuple[Array, Array]:
+        """Torques of joints (k, n) and wheels (k,) by which feet press against the ground [N m].
+
+        Args:
+            frames: Poses from `frames`.
+            forces: Forces (k, 3) of the ground on the feet's lowest points, in B [N].
+            up_B: Unit vector (3,) out of the ground, in B.
+        """
+        contact = frames[:, -1, :3, 3] - self.wheel_radius[:, np.newaxis] * up_B
+        moments = _cross(contact[:, np.newaxis] - frames[..., :3, 3], forces[:, np.newaxis])
+        efforts = -np.sum(frames[..., :3, 2] * moments, axis=-1)
+        return efforts[:, :-1] * self.present, efforts[:, -1]
+
+    def shared_load(self, frames: Array, load: Array, pull_B: Array) -> Array:
+        """Forces (k, 3) of the ground on the feet in B [N] that carry the robot, of least norm.
+
+        Args:
+            frames: Poses from `frames`.
+            load: Shares (k,) of its load that each foot bears, from 0 in the air to 1.
+            pull_B: Acceleration (3,) that the robot feels, g times up plus its own, in B [m/s2].
+        """
+        arms = frames[:, -1, :3, 3] - self.center_of_mass(frames)
+        count = len(arms)
+        grasp = np.zeros((6, count, 3))
+        grasp[0, :, 2], grasp[0, :, 1] = arms[:, 1], -arms[:, 2]
+        grasp[1, :, 0], grasp[1, :, 2] = arms[:, 2], -arms[:, 0]
+        grasp[2, :, 1], grasp[2, :, 0] = arms[:, 0], -arms[:, 1]
+        grasp[3:] = np.eye(3)[:, np.newaxis]
+        flat = grasp.reshape(6, 3 * count)
+        weighted = flat * np.repeat(load, 3)
+        wrench = np.concatenate([np.zeros(3), self._total * pull_B])
+        square = weighted @ flat.T
+        square[range(6), range(6)] += 1e-6 * max(1.0, load.sum())
+        forces: Array = (weighted.T @ np.linalg.solve(square, wrench)).reshape(-1, 3)
+        return forces
 
     def rolling(self, frames: Array, w_F_B: Array, v_F_B: Array, up_B: Array) -> tuple[Array, Array]:
         """How ball-shaped wheels roll on level ground as their legs move and lean.

@@ -1,6 +1,6 @@
 """What a robot's legs are about to do, for one moment; and what the plan is made from."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -43,11 +43,13 @@ class LegCommand:
         v_xyw_B: Body twist (3,) [m/s, m/s, rad/s].
         offset: Pose (6,) of the body from where its posture has it: x, y, z [m], roll, pitch, yaw [rad].
         mode: How.
+        correction: Twist (3,) that brings the robot back to its reference while it moves [m/s, m/s, rad/s].
     """
 
     v_xyw_B: Array
     offset: Array
     mode: LegMode
+    correction: Array = field(default_factory=lambda: np.zeros(3))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -77,6 +79,7 @@ class LegPlan:
     Attributes:
         time: The moment [s].
         q_xyt: Planar pose (3,) of B in P, without the offset [m, m, rad].
+        reference: The pose (3,) that the accepted twist alone leads to [m, m, rad].
         twist: Body twist (3,) [m/s, m/s, rad/s], and its rate.
         offset: Offset (6,) of the body (see `LegCommand`), and its rate.
         height: Height of Bo over the ground, without the offset [m].
@@ -99,6 +102,7 @@ class LegPlan:
 
     time: float
     q_xyt: Array
+    reference: Array
     twist: Follower
     offset: Follower
     height: float

@@ -71,6 +71,7 @@ class LegPlanner:
         self._heading = {name: self.group.headings(self.group.frames(q)) for name, q in self._q.items()}
         radius = self.group.wheel_radius
         self._height = {name: float(np.mean(radius - feet[:, 2])) for name, feet in centers.items()}
+        self._last = [len(leg.links) - 1 for leg in robot.legs]
         # Joints that a posture has near a limit do not steer.
         low, high = self.group.limits
         angles = np.array(list(self._q.values()))
@@ -89,6 +90,10 @@ class LegPlanner:
         """Joint angles (k, n) of a posture [rad]."""
         return self._q[posture]
 
+    def holds(self, posture: str) -> Hold:
+        """What a posture holds."""
+        return self._holds[posture]
+
     def start(self, mode: LegMode | None = None) -> LegPlan:
         """A robot that stands at the origin, in a mode's posture, by default the first."""
         mode = mode or LegMode(posture=next(iter(self.postures)))
@@ -98,6 +103,7 @@ class LegPlanner:
         return LegPlan(
             time=0.0,
             q_xyt=np.zeros(3),
+            reference=np.zeros(3),
             twist=Follower(np.zeros(3), np.zeros(3)),
             offset=Follower(np.zeros(6), np.zeros(6)),
             height=self._height[mode.posture],
@@ -144,11 +150,14 @@ class LegPlanner:
         plan = self._accepting(plan, command, feedback)
         twist = plan.twist.follow(plan.accepted, dt, TWIST_TIME)
         mean = 0.5 * (plan.twist.value + twist.value)
+        # A robot that stands is not corrected: its feet are where they are.
+        moved = mean + command.correction if mean.any() else mean
         wanted = command.offset if plan.activity in ("walk", "drive") else 0.0 * command.offset
         plan = replace(
             plan,
             time=plan.time + dt,
-            q_xyt=odometry.integrate(plan.q_xyt, mean, dt),
+            q_xyt=odometry.integrate(plan.q_xyt, moved, dt),
+            reference=odometry.integrate(plan.reference, mean, dt),
             twist=twist,
             offset=plan.offset.follow(wanted, dt, OFFSET_TIME),
         )
@@ -156,7 +165,7 @@ class LegPlanner:
             case "walk":
                 plan = self._walk(plan, dt, feedback)
             case "drive":
-                plan = self._drive(plan, dt, mean, command)
+                plan = self._drive(plan, dt, moved, command)
             case "change":
                 plan = self._change(plan, dt)
             case "halt":
@@ -327,8 +336,7 @@ class LegPlanner:
 
     def _begin_drive(self, plan: LegPlan, feedback: LegFeedback) -> LegPlan:
         frames = self.group.frames(feedback.q)
-        last = np.array([len(leg.links) - 1 for leg in self.robot.legs])
-        joints = frames[range(len(last)), last]
+        joints = frames[range(len(frames)), self._last]
         contact = _seen_from(plan.q_xyt, plan.feet_P[:, :2])
         start = wheeling.wheeling_from(contact, self.group.headings(frames), joints[:, :2, 3], joints[:, 2, 2])
         return replace(plan, activity="drive", wheeling=start, load=np.ones(len(contact)))
@@ -479,11 +487,11 @@ class LegPlanner:
         feet = np.column_stack([_placed(plan.q_xyt, contact), plan.feet_P[:, 2]])
         rows, headings = np.zeros(self.group.shape), np.full(len(feet), not change.stages[0].straight)
         if change.stages[0].straight:
-            last = np.array([len(leg.links) - 1 for leg in self.robot.legs])
-            rows[range(len(last)), last] = 1.0
+            steering = (range(len(feet)), self._last)
+            rows[steering] = 1.0
             inner = next(name for name in (change.posture.name, plan.posture.name) if self._under_hips(name))
-            begun = change.q_from[range(len(last)), last]
-            heading = begun + s * (self._q[inner][range(len(last)), last] - begun)
+            begun = change.q_from[steering]
+            heading = begun + s * (self._q[inner][steering] - begun)
         return replace(plan, feet_P=feet, hold=replace(plan.hold, rows=rows, values=heading, heading=headings))
 
 

@@ -45,7 +45,7 @@ def track(
     poses: tuple[Array, Array],
     places: tuple[Array, Array],
     hold: Hold,
-    stance: Array,
+    stance: NDArray[np.bool_],
     dt: float,
 ) -> Tracked:
     """Moves legs so that the feet reach their places in one period.

@@ -1,0 +1,399 @@
+"""Robots on legs as Drake Systems: gait planner, leg inverse kinematics, servo, stance odometry, closed body pose.
+
+Planner and odometry are Python systems that work once in a period of control; between periods only Drake's C++ runs.
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydrake.common.value import Value
+from pydrake.systems.framework import BasicVector, Context, Diagram, DiagramBuilder, LeafSystem, State
+from pydrake.systems.primitives import Adder, Gain, LinearSystem, MatrixGain, Saturation
+
+from rollerbench.description import Leg, Robot, load_robot
+from rollerbench.description.inertia import GRAVITY
+from rollerbench.errors import KinematicsError
+from rollerbench.kinematics.legs.group import LegGroup
+from rollerbench.kinematics.legs.plan import LegCommand, LegFeedback, LegMode, LegPlan
+from rollerbench.kinematics.legs.planner import LegPlanner
+from rollerbench.kinematics.legs.tracker import Tracked, track
+from rollerbench.plant import RobotModel
+from rollerbench.sdf.servo import leg_gains
+
+Array = NDArray[np.float64]
+
+PERIOD = 0.01
+"""Period of control [s]."""
+
+
+class GaitPlanner(LeafSystem):
+    """Plans body and feet from a twist command: walking, driving on the feet's wheels, changing the posture.
+
+    Input ports:
+        v_xyw_B (3): body twist [m/s, m/s, rad/s]; 0 if not connected.
+        body_offset (6): pose of the body from where its posture has it: x, y, z [m], roll, pitch, yaw [rad]; 0 if not
+            connected.
+        mode: a `LegMode`; the one it was made with if not connected.
+        correction (3): twist that brings the robot back to its reference while it moves; 0 if not connected.
+        tracked: what the legs do, from `LegTracker`; as planned if not connected.
+        foot_loads (n_legs): measured loads of the feet [N], with which it feels its way over uneven ground; if not
+            connected the ground is level.
+        fault (1): anything but 0 halts the robot; optional.
+    Output ports:
+        plan: the `LegPlan` for the end of the present period.
+        foot_positions (3 n_legs): centres of the feet's wheels in B then [m].
+        q_xyt (3): where the accepted twists alone lead to: the reference [m, m, rad].
+        v_xyw_B (3): the accepted twist, smoothed [m/s, m/s, rad/s].
+    """
+
+    def __init__(
+        self, robot: Robot | str | Path | Mapping[str, Any], period: float = PERIOD, mode: LegMode | None = None
+    ):
+        """Makes the system for a robot.
+
+        Args:
+            robot: The robot.
+            period: Period of control [s].
+            mode: How it follows commands; by default in its first posture, walking with the tripod gait.
+
+        Raises:
+            KinematicsError: the robot has no legs, or not this mode.
+        """
+        super().__init__()
+        _require_period(period)
+        self.planner, self._period = LegPlanner(load_robot(robot)), period
+        self._mode = mode or LegMode(posture=self.planner.robot.standing[0].name)
+        start = self.planner.start(self._mode)
+        count = len(start.load)
+        self._inputs = {
+            "v_xyw_B": self.DeclareVectorInputPort("v_xyw_B", 3),
+            "body_offset": self.DeclareVectorInputPort("body_offset", 6),
+            "mode": self.DeclareAbstractInputPort("mode", Value(self._mode)),
+            "correction": self.DeclareVectorInputPort("correction", 3),
+            "tracked": self.DeclareAbstractInputPort("tracked", Value(_standing(self.planner, start))),
+            "foot_loads": self.DeclareVectorInputPort("foot_loads", count),
+            "fault": self.DeclareVectorInputPort("fault", 1),
+        }
+        index = self.DeclareAbstractState(Value(start))
+        self.DeclarePeriodicUnrestrictedUpdateEvent(period, 0.0, self._update)
+        own = {self.abstract_state_ticket(index)}
+        self.DeclareStateOutputPort("plan", index)
+        self.DeclareVectorOutputPort("foot_positions", 3 * count, self._calc_feet, own)
+        self.DeclareVectorOutputPort("q_xyt", 3, lambda c, out: out.SetFromVector(self.plan(c).reference), own)
+        self.DeclareVectorOutputPort("v_xyw_B", 3, lambda c, out: out.SetFromVector(self.plan(c).twist.value), own)
+
+    def plan(self, context: Context) -> LegPlan:
+        """The plan in a context of this system."""
+        return context.get_abstract_state(0).get_value()
+
+    def _eval(self, context: Context, name: str, default: Any) -> Any:
+        port = self._inputs[name]
+        return port.Eval(context) if port.HasValue(context) else default
+
+    def _update(self, context: Context, state: State) -> None:
+        plan = self.plan(context)
+        command = LegCommand(
+            v_xyw_B=self._eval(context, "v_xyw_B", np.zeros(3)),
+            offset=self._eval(context, "body_offset", np.zeros(6)),
+            mode=self._eval(context, "mode", self._mode),
+            correction=self._eval(context, "correction", np.zeros(3)),
+        )
+        tracked = self._eval(context, "tracked", None) or _planned(self.planner, plan)
+        q, _ = tracked.next(self._period)
+        fault = tracked.fault
+        if self._eval(context, "fault", np.zeros(1)).any():
+            fault = "a leg does not follow"
+        feedback = LegFeedback(
+            q=q,
+            q_rate=tracked.q_rate,
+            roll_P=tracked.roll_P,
+            loads=self._eval(context, "foot_loads", None),
+            fault=fault,
+        )
+        following = self.planner.advance(plan, self._period, command, feedback)
+        state.get_mutable_abstract_state(0).set_value(following)
+
+    def _calc_feet(self, context: Context, output: BasicVector) -> None:
+        output.SetFromVector(self.planner.centers_B(self.plan(context)).ravel())
+
+
+class LegInverseKinematics(LeafSystem):
+    """Joint angles that put the feet where they shall be, in a posture.
+
+    It follows the branch on which it is, from the posture on; out of reach the legs stop, and say so.
+
+    Input ports:
+        foot_positions (3 n_legs): centres of the feet's wheels in B [m].
+    Output ports:
+        joint_angles (n): leg by leg, each leg's joints and then 0 for its wheel [rad].
+        out_of_reach (1): 0, or how far the worst foot misses its place [m].
+    """
+
+    def __init__(
+        self, robot: Robot | str | Path | Mapping[str, Any], posture: str | None = None, period: float = PERIOD
+    ) -> None:
+        """Makes the system for a robot.
+
+        Args:
+            robot: The robot.
+            posture: The posture that the legs keep; by default the first.
+            period: Period in which it remembers where the legs are [s].
+
+        Raises:
+            KinematicsError: the robot has no legs, or not this posture.
+        """
+        super().__init__()
+        _require_period(period)
+        planner = LegPlanner(load_robot(robot))
+        mode = LegMode(posture=posture or planner.robot.standing[0].name)
+        planner.require(mode)
+        self._group, self._hold = planner.group, planner.holds(mode.posture)
+        self._feet = self.DeclareVectorInputPort("foot_positions", 3 * self._group.shape[0])
+        q = self._hold.near
+        index = self.DeclareDiscreteState(q.ravel())
+        self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._update)
+        sources = {self._feet.ticket(), self.discrete_state_ticket(index)}
+        size = len(self._group.to_vector(q, np.zeros(len(q))))
+        self.DeclareVectorOutputPort("joint_angles", size, self._calc_angles, sources)
+        self.DeclareVectorOutputPort("out_of_reach", 1, self._calc_miss, sources)
+
+    def _solved(self, context: Context) -> tuple[Array, Array]:
+        q = context.get_discrete_state(0).value().reshape(self._group.shape)
+        targets = np.asarray(self._feet.Eval(context)).reshape(-1, 3)
+        near = type(self._hold)(rows=self._hold.rows, values=self._hold.values, heading=self._hold.heading, near=q)
+        solved, _, missed = self._group.inverse(targets, near, iterations=20)
+        bad = (missed > 1e-3) | self._group.beyond_limits(solved).any(axis=1)
+        return np.where(bad[:, np.newaxis], q, solved), np.where(bad, np.maximum(missed, 1e-9), 0.0)
+
+    def _update(self, context: Context, state: Any) -> None:
+        state.set_value(0, self._solved(context)[0].ravel())
+
+    def _calc_angles(self, context: Context, output: BasicVector) -> None:
+        q, missed = self._solved(context)
+        output.SetFromVector(self._group.to_vector(q, np.zeros(len(missed))))
+
+    def _calc_miss(self, context: Context, output: BasicVector) -> None:
+        output.SetFromVector([self._solved(context)[1].max()])
+
+
+class LegTracker(LeafSystem):
+    """Joint and wheel speeds that carry out a plan, and the torques that bear the robot meanwhile.
+
+    The wheels of standing feet roll as their legs lean and move; the others rest.
+
+    Input ports:
+        plan: the `LegPlan` for the end of the present period, from `GaitPlanner`.
+    Output ports:
+        tracked: the `Tracked` of the present period.
+        joint_rates (n): mean speeds until the end of the period, leg by leg, each leg's joints and then its wheel
+            [rad/s].
+        joint_efforts (n): torques against gravity and for the load of the feet, in the same order [N m].
+    """
+
+    def __init__(
+        self, robot: Robot | str | Path | Mapping[str, Any], period: float = PERIOD, mode: LegMode | None = None
+    ):
+        """Makes the system for a robot; arguments as of `GaitPlanner`."""
+        super().__init__()
+        _require_period(period)
+        self._planner, self._period = LegPlanner(load_robot(robot)), period
+        start = self._planner.start(mode)
+        self._group: LegGroup = self._planner.group
+        self._start = start
+        self._plan = self.DeclareAbstractInputPort("plan", Value(start))
+        first = _standing(self._planner, start)
+        index = self.DeclareAbstractState(Value((first.q, first.wheel, start)))
+        self.DeclarePeriodicUnrestrictedUpdateEvent(period, 0.0, self._update)
+        sources = {self._plan.ticket(), self.abstract_state_ticket(index)}
+        size = len(self._group.to_vector(first.q, first.wheel))
+        self._tracked = self.DeclareAbstractOutputPort("tracked", lambda: Value(first), self._calc_tracked, sources)
+        self.DeclareVectorOutputPort("joint_rates", size, self._calc_rates, sources)
+        self.DeclareVectorOutputPort("joint_efforts", size, self._calc_efforts, sources)
+
+    @property
+    def angles(self) -> Array:
+        """Angles (n) at the start, in the order of the ports [rad]."""
+        start = self._start
+        return self._group.to_vector(self._planner.joints(start.posture.name), np.zeros(len(start.load)))
+
+    def _calc_tracked(self, context: Context, output: Any) -> None:
+        plan: LegPlan = self._plan.Eval(context)
+        q, wheel, before = context.get_abstract_state(0).get_value()
+        if plan is before:
+            output.set_value(_still(q, wheel))
+            return
+        poses = (before.X_PB, plan.X_PB)
+        places = (self._planner.centers_B(before), self._planner.centers_B(plan))
+        output.set_value(track(self._group, q, wheel, poses, places, plan.hold, plan.swing < 0, self._period))
+
+    def _update(self, context: Context, state: State) -> None:
+        tracked: Tracked = self._tracked.Eval(context)
+        q, wheel = tracked.next(self._period)
+        state.get_mutable_abstract_state(0).set_value((q, wheel, self._plan.Eval(context)))
+
+    def _calc_rates(self, context: Context, output: BasicVector) -> None:
+        tracked: Tracked = self._tracked.Eval(context)
+        output.SetFromVector(self._group.to_vector(tracked.q_rate, tracked.wheel_rate))
+
+    def _calc_efforts(self, context: Context, output: BasicVector) -> None:
+        plan: LegPlan = self._plan.Eval(context)
+        tracked: Tracked = self._tracked.Eval(context)
+        pose, (q, _) = plan.X_PB, tracked.next(self._period)
+        frames, up_B = self._group.frames(q), pose[2, :3]
+        ahead = np.array([*plan.twist.rate[:2], 0.0])
+        forces = self._group.shared_load(frames, plan.load, GRAVITY * up_B + ahead)
+        joints, wheels = self._group.contact_efforts(frames, forces, up_B)
+        output.SetFromVector(self._group.to_vector(joints + self._group.gravity_efforts(frames, up_B), wheels))
+
+
+class LegServo(Diagram):
+    """Torques that make joints follow speeds, within what the motors have.
+
+    motor = sat(k (q_d - q) + d (v_d - v) + u_ff). A damping of this size would shake in steps of milliseconds, so the
+    joints have it too, where Drake takes it implicitly (`damp_joints`), and the actuation adds it: u = motor + d v.
+    All of it is Drake's C++.
+
+    Input ports:
+        joint_rates (n): desired speeds, leg by leg, each leg's joints and then its wheel [rad/s].
+        joint_efforts (n): feed-forward torques in the same order [N m].
+        state (nq + nv): state of the robot's model instance.
+    Output ports:
+        actuation (n_actuators): for the plant's actuation port [N m].
+        motor_efforts (n): torques of the motors, in the order of the inputs [N m].
+        lag (n): desired minus true angles [rad].
+    """
+
+    def __init__(self, model: RobotModel, time_step: float, lost: Mapping[str, float] = MappingProxyType({})) -> None:
+        """Builds the diagram.
+
+        Args:
+            model: The robot, in a plant that is finalized.
+            time_step: Step of the plant [s].
+            lost: Legs whose motors give no torque any more, by name, and from when on [s].
+        """
+        super().__init__()
+        builder = DiagramBuilder()
+        stiffness, damping, limit = _gains(model)
+        size = len(stiffness)
+        identity = np.eye(size)
+        # The plant's step starts from the angles at its beginning: the sum lags by a step, which D makes up.
+        desired = LinearSystem(identity, time_step * identity, identity, time_step * identity, time_step)
+        self._desired = builder.AddNamedSystem("desired_angles", desired)
+        angles, rates = np.split(model.leg_state_matrix(), 2)
+        lag = builder.AddNamedSystem("lag", Adder(2, size))
+        builder.Connect(self._desired.get_output_port(), lag.get_input_port(0))
+        minus = builder.AddNamedSystem("minus_angles", MatrixGain(-angles))
+        builder.Connect(minus.get_output_port(), lag.get_input_port(1))
+        terms = builder.AddNamedSystem("terms", Adder(4, size))
+        for index, (name, gain) in enumerate((("stiffness", stiffness), ("damping", damping))):
+            system = builder.AddNamedSystem(name, Gain(gain))
+            builder.Connect(system.get_output_port(), terms.get_input_port(index))
+        builder.Connect(lag.get_output_port(), builder.GetSubsystemByName("stiffness").get_input_port())
+        viscous = builder.AddNamedSystem("viscous", MatrixGain(-damping[:, np.newaxis] * rates))
+        builder.Connect(viscous.get_output_port(), terms.get_input_port(2))
+        motors = builder.AddNamedSystem("motors", Saturation(-limit, limit))
+        builder.Connect(terms.get_output_port(), motors.get_input_port())
+        effort_port = motors.get_output_port()
+        if lost:
+            failing = builder.AddNamedSystem("lost_legs", LostLegs(model.robot, lost))
+            builder.Connect(effort_port, failing.get_input_port())
+            effort_port = failing.get_output_port()
+        efforts = model.leg_effort_matrix()
+        actuated = builder.AddNamedSystem("actuated", MatrixGain(efforts))
+        builder.Connect(effort_port, actuated.get_input_port())
+        added = builder.AddNamedSystem("added_damping", MatrixGain(efforts @ (damping[:, np.newaxis] * rates)))
+        actuation = builder.AddNamedSystem("actuation", Adder(2, len(efforts)))
+        builder.Connect(actuated.get_output_port(), actuation.get_input_port(0))
+        builder.Connect(added.get_output_port(), actuation.get_input_port(1))
+        builder.ExportInput(self._desired.get_input_port(), "joint_rates")
+        builder.ConnectInput("joint_rates", builder.GetSubsystemByName("damping").get_input_port())
+        builder.ExportInput(terms.get_input_port(3), "joint_efforts")
+        builder.ExportInput(minus.get_input_port(), "state")
+        for system in (viscous, added):
+            builder.ConnectInput("state", system.get_input_port())
+        builder.ExportOutput(actuation.get_output_port(), "actuation")
+        builder.ExportOutput(effort_port, "motor_efforts")
+        builder.ExportOutput(lag.get_output_port(), "lag")
+        builder.BuildInto(self)
+
+    def set_angles(self, context: Context, angles: ArrayLike) -> None:
+        """Sets the desired angles (n) in a context of this system [rad]."""
+        own = self.GetMutableSubsystemContext(self._desired, context)
+        own.SetDiscreteState(np.asarray(angles, dtype=np.float64))
+
+
+class LostLegs(LeafSystem):
+    """Motors of legs that give no torque any more from some time on.
+
+    Input ports:
+        efforts (n): torques, leg by leg, each leg's joints and then its wheel [N m].
+    Output ports:
+        efforts (n): those that are left [N m].
+    """
+
+    def __init__(self, robot: Robot, lost: Mapping[str, float]) -> None:
+        """Makes the system for legs by name and the times when they are lost [s]."""
+        super().__init__()
+        times = [[lost.get(leg.name, np.inf)] * (len(leg.links) + 1) for leg in robot.legs]
+        self._until = np.concatenate(times)
+        self._efforts = self.DeclareVectorInputPort("efforts", len(self._until))
+        self.DeclareVectorOutputPort("efforts", len(self._until), self._calc)
+
+    def _calc(self, context: Context, output: BasicVector) -> None:
+        output.SetFromVector(np.where(context.get_time() < self._until, self._efforts.Eval(context), 0.0))
+
+
+def unlimited(robot: Robot) -> Robot:
+    """The robot with motors of legs that have no limits: its `LegServo` knows them."""
+
+    def leg(described: Leg) -> Leg:
+        links = tuple(link.model_copy(update={"max_effort": None}) for link in described.links)
+        wheel = described.wheel.model_copy(update={"max_effort": None})
+        return described.model_copy(update={"links": links, "wheel": wheel})
+
+    return robot.model_copy(update={"legs": tuple(leg(each) for each in robot.legs)})
+
+
+def damp_joints(model: RobotModel) -> None:
+    """Gives the joints of a robot's legs the damping of its `LegServo`, before the plant is finalized."""
+    for leg in model.robot.legs:
+        gains = leg_gains(model.robot, leg)
+        for joint in model.leg_joints(leg):
+            joint.set_default_damping(gains.damping)
+        if leg.wheel.driven:
+            model.wheel_joint(leg).set_default_damping(gains.wheel_damping)
+
+
+def _gains(model: RobotModel) -> tuple[Array, Array, Array]:
+    """Stiffness [N m], damping [N m s] and largest torque [N m], in the order of `RobotModel.leg_state_matrix`."""
+    rows = []
+    for leg in model.robot.legs:
+        gains = leg_gains(model.robot, leg)
+        rows += [(gains.stiffness, gains.damping, link.max_effort or np.inf) for link in leg.links]
+        wheel = (gains.wheel_stiffness, gains.wheel_damping, leg.wheel.max_effort or np.inf)
+        rows.append(wheel if leg.wheel.driven else (0.0, 0.0, np.inf))
+    stiffness, damping, limit = np.array(rows).T
+    return stiffness, damping, limit
+
+
+def _standing(planner: LegPlanner, plan: LegPlan) -> Tracked:
+    return _still(planner.joints(plan.posture.name), np.zeros(len(plan.load)))
+
+
+def _still(q: Array, wheel: Array) -> Tracked:
+    return Tracked(q=q, wheel=wheel, q_rate=0 * q, wheel_rate=0 * wheel, roll_P=np.zeros((len(q), 3)))
+
+
+def _planned(planner: LegPlanner, plan: LegPlan) -> Tracked:
+    """Legs that are where the plan has them."""
+    q, _, _ = planner.group.inverse(planner.centers_B(plan), plan.hold, iterations=10)
+    return _still(q, np.zeros(len(q)))
+
+
+def _require_period(period: float) -> None:
+    if not (np.isfinite(period) and period > 0):
+        raise KinematicsError(f"period = {period}: accepted: a positive number of seconds")
