@@ -4,6 +4,7 @@ Planner and odometry are Python systems that work once in a period of control; b
 """
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -180,6 +181,18 @@ class LegInverseKinematics(LeafSystem):
         output.SetFromVector([self._solved(context)[1].max()])
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Reached:
+    """Where the legs are, and the plan that brought them there."""
+
+    q: Array
+    wheel: Array
+    plan: LegPlan
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> "_Reached":
+        return self
+
+
 class LegTracker(LeafSystem):
     """Joint and wheel speeds that carry out a plan, and the torques that bear the robot meanwhile.
 
@@ -206,7 +219,7 @@ class LegTracker(LeafSystem):
         self._start = start
         self._plan = self.DeclareAbstractInputPort("plan", Value(start))
         first = _standing(self._planner, start)
-        index = self.DeclareAbstractState(Value((first.q, first.wheel, start)))
+        index = self.DeclareAbstractState(Value(_Reached(first.q, first.wheel, start)))
         self.DeclarePeriodicUnrestrictedUpdateEvent(period, 0.0, self._update)
         sources = {self._plan.ticket(), self.abstract_state_ticket(index)}
         size = len(self._group.to_vector(first.q, first.wheel))
@@ -222,7 +235,8 @@ class LegTracker(LeafSystem):
 
     def _calc_tracked(self, context: Context, output: Any) -> None:
         plan: LegPlan = self._plan.Eval(context)
-        q, wheel, before = context.get_abstract_state(0).get_value()
+        reached: _Reached = context.get_abstract_state(0).get_value()
+        q, wheel, before = reached.q, reached.wheel, reached.plan
         if plan is before:
             output.set_value(_still(q, wheel))
             return
@@ -233,7 +247,7 @@ class LegTracker(LeafSystem):
     def _update(self, context: Context, state: State) -> None:
         tracked: Tracked = self._tracked.Eval(context)
         q, wheel = tracked.next(self._period)
-        state.get_mutable_abstract_state(0).set_value((q, wheel, self._plan.Eval(context)))
+        state.get_mutable_abstract_state(0).set_value(_Reached(q, wheel, self._plan.Eval(context)))
 
     def _calc_rates(self, context: Context, output: BasicVector) -> None:
         tracked: Tracked = self._tracked.Eval(context)

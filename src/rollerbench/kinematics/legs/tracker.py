@@ -1,6 +1,7 @@
 """Joint angles and wheel speeds that follow a plan of the feet."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +33,10 @@ class Tracked:
     wheel_rate: Array
     roll_P: Array
     fault: str = ""
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> "Tracked":
+        """Itself (see `LegPlan`)."""
+        return self
 
     def next(self, dt: float) -> tuple[Array, Array]:
         """Joint angles (k, n) and wheel angles (k,) after the period dt [s]."""
