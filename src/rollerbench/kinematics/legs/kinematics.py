@@ -9,7 +9,7 @@ from rollerbench.description.legs import Leg, chain_frames
 from rollerbench.errors import KinematicsError, UnreachableTarget
 from rollerbench.kinematics.legs.chain import jacobian, position
 from rollerbench.kinematics.legs.families import FAMILIES, VERTICAL
-from rollerbench.kinematics.legs.numeric import Search
+from rollerbench.kinematics.legs.numeric import Search, spread
 from rollerbench.kinematics.legs.song import SongLeg
 from rollerbench.kinematics.limits.result import finite
 
@@ -72,6 +72,8 @@ class LegKinematics:
         self.leg = leg
         self._rows, self._limits = leg.rows, leg.limits
         self.song = SongLeg.of(self._rows)
+        postures = [leg.posture(name) for name in leg.postures]
+        self._seeds = np.vstack([self._limits.mean(axis=0), *postures, spread(self._limits)])
 
     def forward(self, q: ArrayLike) -> Array:
         """Pose X_LF (..., 4, 4) of the foot, its origin the wheel's centre and z the axle, at angles (..., n) [rad]."""
@@ -95,7 +97,7 @@ class LegKinematics:
     def singularity(self, q: ArrayLike) -> Singularity:
         """How near joint angles (..., n) [rad] are to a singular pose.
 
-        For the leg of Song et al. |det| = |r| l2 D |sin(th3 + beta)| with D = hypot(d4, l4 c4), beta = atan2(l4 c4, d4).
+        For the leg of Song et al., |det| = |r| l2 D |sin(th3 + beta)|: D = hypot(d4, l4 c4), beta = atan2(l4 c4, d4).
         """
         angles = self._angles("q", q)
         values = np.linalg.svd(jacobian(self._rows, angles)[..., 3:, :], compute_uv=False)
@@ -126,8 +128,8 @@ class LegKinematics:
     ) -> Array:
         """Joint angles that put the wheel's centre at p_LF.
 
-        In closed form for the leg of Song et al., but for "least", "joint_2" and "joint_3"; for these and for other legs
-        by iteration.
+        In closed form for the leg of Song et al., but for "least", "joint_2" and "joint_3"; for these and for other
+        legs by iteration.
 
         Args:
             p_LF: Wheel centres (..., 3) in L [m].
@@ -140,8 +142,8 @@ class LegKinematics:
             all_branches: Whether to return all solutions instead.
 
         Returns:
-            (..., n), each joint within its limits. With all_branches (..., k, n), NaN where there is no solution, or one
-            beyond the limits: k = 4, 8 for "inclination", 1 where it was found by iteration.
+            (..., n), each joint within its limits. With all_branches (..., k, n), NaN where there is no solution, or
+            one beyond the limits: k = 4, 8 for "inclination", 1 where it was found by iteration.
 
         Raises:
             UnreachableTarget: there is no solution for a target; never with all_branches.
@@ -190,12 +192,11 @@ class LegKinematics:
             return self._closed(self.song, targets, hold, held, wanted)
         joint = None if hold == "least" else int(hold.removeprefix("joint_")) - 1
         count = len(self._rows)
-        postures = [np.radians(angles) for angles in self.leg.postures.values()]
         search = Search(
             rows=self._rows,
             limits=self._limits,
             length=self.leg.length,
-            seeds=np.vstack([self._limits.mean(axis=0), *postures]),
+            seeds=self._seeds,
         )
         flat = targets.reshape(-1, 3), wanted.reshape(-1, count)
         inside = held if joint is None else np.clip(held, *self._limits[:, joint])
