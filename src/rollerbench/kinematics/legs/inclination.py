@@ -28,6 +28,8 @@ def branches(leg: SongLeg, p: Array, value: Array, near: Array) -> Array:
     x_polynomial = x_polynomial + ((rho / scale) ** 2 - thigh**2)[..., np.newaxis] * one
     quartic = _product(x_polynomial, x_polynomial) - 4 * _product(thigh**2 * one - gg, kk)
     roots = np.clip(real_roots(quartic, -1.0 - 1e-7, 1.0 + 1e-7), -1.0, 1.0)
+    # On the hip's axis w = 0, where w^2 is known only to rounding.
+    roots = np.where(rho[..., np.newaxis] <= TOLERANCE * scale, np.sign(roots), roots)
     sine = np.clip(evaluate(g, roots) / thigh, -1.0, 1.0)
     side = np.where(evaluate(x_polynomial, roots) * evaluate(k, roots) < 0, -1.0, 1.0)
     joint_2 = np.arctan2(sine, side * np.sqrt(1.0 - sine**2))
@@ -80,7 +82,7 @@ def _polished(leg: SongLeg, rho: Array, z: Array, value: Array, joint_2: Array, 
 def excess(leg: SongLeg, p: Array, value: Array) -> Array:
     """Distance (...) [m] of feet (..., 3) from the points in reach at inclinations (...), 0 in reach; by a search."""
     found = branches(leg, p, value, np.zeros((*p.shape[:-1], 4)))
-    out = np.isnan(found).all(axis=(-1, -2))
+    out = np.isnan(found).any(axis=-1).all(axis=-1)
     distance = np.zeros(out.shape)
     for index in np.argwhere(out):
         at = tuple(index)

@@ -10,6 +10,7 @@ from rollerbench.errors import KinematicsError, UnreachableTarget
 from rollerbench.kinematics.legs.chain import jacobian, position
 from rollerbench.kinematics.legs.families import FAMILIES, VERTICAL
 from rollerbench.kinematics.legs.numeric import Search, spread
+from rollerbench.kinematics.legs.singularity import Singularity, singularity
 from rollerbench.kinematics.legs.song import SongLeg
 from rollerbench.kinematics.limits.result import finite
 
@@ -17,33 +18,6 @@ Array = NDArray[np.float64]
 
 AT_LIMIT = 1e-10
 """Joints beyond their limits by this angle [rad], which rounding may cause, are set to them."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Singularity:
-    """How near leg poses are to singular ones, in which the foot loses a direction of motion.
-
-    The last three are None of legs that are not built like that of Song et al.
-
-    Attributes:
-        smallest_singular_value: Of the foot's velocity Jacobian of all joints (...) [m].
-        determinant: |det| of that of the first three joints (...) [m3], |r| l2 D |sin(th3 + beta)|.
-        hip_distance: |r| (...) [m]: how far the foot is ahead of the hip's axis in the plane of the thigh; at 0 joint 1
-            moves it only along that plane.
-        knee_distance: How far (...) [m] the foot is, seen from the hip, from where the knee is outstretched or folded.
-    """
-
-    smallest_singular_value: Array
-    determinant: Array | None
-    hip_distance: Array | None
-    knee_distance: Array | None
-
-    @property
-    def cause(self) -> NDArray[np.str_] | None:
-        """The nearer of the two singular poses (...), "hip" or "knee"; None of legs of another kind."""
-        if self.hip_distance is None or self.knee_distance is None:
-            return None
-        return np.where(self.hip_distance < self.knee_distance, "hip", "knee")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -100,22 +74,7 @@ class LegKinematics:
         For the leg of Song et al., |det| = |r| l2 D |sin(th3 + beta)|: D = hypot(d4, l4 c4), beta = atan2(l4 c4, d4).
         """
         angles = self._angles("q", q)
-        values = np.linalg.svd(jacobian(self._rows, angles)[..., 3:, :], compute_uv=False)
-        smallest = np.asarray(values[..., -1], dtype=np.float64)
-        if self.song is None:
-            return Singularity(
-                smallest_singular_value=smallest, determinant=None, hip_distance=None, knee_distance=None
-            )
-        r, _, h = self.song.coordinates(angles)
-        shank, lead = self.song.shank(angles[..., 3])
-        span = np.hypot(r, h)
-        thigh = self.song.thigh
-        return Singularity(
-            smallest_singular_value=smallest,
-            determinant=np.abs(r * thigh * shank * np.sin(angles[..., 2] + lead)),
-            hip_distance=np.abs(r),
-            knee_distance=np.minimum(np.abs(thigh + shank - span), np.abs(span - np.abs(thigh - shank))),
-        )
+        return singularity(self.song, jacobian(self._rows, angles), angles)
 
     def inverse(
         self,
@@ -215,7 +174,9 @@ class LegKinematics:
         turned = np.where(q > self._limits[1], q - 2 * np.pi, np.where(q < self._limits[0], q + 2 * np.pi, q))
         here, there = self._beyond(q), self._beyond(turned)
         q = np.where((here > AT_LIMIT) & (there < here), turned, q)
-        missing = np.isnan(q).all(axis=(-1, -2)) if hold == "inclination" else np.ones(held.shape, dtype=np.bool_)
+        missing = (
+            np.isnan(q).any(axis=-1).all(axis=-1) if hold == "inclination" else np.ones(held.shape, dtype=np.bool_)
+        )
         excess = np.zeros(held.shape)
         if missing.any():
             excess[missing] = family.excess(song, targets[missing], held[missing])
