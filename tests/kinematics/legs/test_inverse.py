@@ -74,6 +74,24 @@ def test_branches_are_distinct_and_complete(leg, hold) -> None:
     assert np.max(original) < 1e-6
 
 
+@pytest.mark.parametrize("offset", [None, 0.0, 1e-10, 1e-7, 1e-3])
+def test_up_to_eight_branches_at_an_inclination(free, offset) -> None:
+    # A leg with a long foot, at any inclination and at and beside the vertical, where the quartic loses its degree.
+    lengths = ({}, {"a": 0.3}, {}, {"a": 0.3, "d": -0.1})
+    links = tuple(link.model_copy(update=update) for link, update in zip(free.leg.links, lengths, strict=True))
+    kinematics = rb.legs.LegKinematics(free.leg.model_copy(update={"links": links}))
+    q = np.random.default_rng(0).uniform(-np.pi, np.pi, (20_000, 4))
+    if offset is not None:
+        q[:, 2] = offset - np.pi / 2 - q[:, 1]
+    target, value = kinematics.position(q), q[:, 1] + q[:, 2]
+    branches = kinematics.inverse(target, hold="inclination", value=value, all_branches=True)
+    original = np.nanmin(np.linalg.norm(np.exp(1j * branches) - np.exp(1j * q)[:, np.newaxis], axis=-1), axis=1)
+    assert np.max(original) < 1e-6  # none is lost; near folds a branch is known to the square root of rounding
+    count = np.isfinite(branches).all(axis=-1).sum(axis=1)
+    assert np.all(count % 2 == 0)  # joint 4 to either side
+    assert np.max(count) == 8 or offset is not None
+
+
 @pytest.mark.parametrize("hold", ["joint_4", "joint_1", "tibia"])
 def test_inside_there_are_four_branches(free, hold) -> None:
     value = {"joint_4": 0.4, "joint_1": 0.2, "tibia": None}[hold]

@@ -32,6 +32,8 @@ def branches(leg: SongLeg, p: Array, value: Array, near: Array) -> Array:
     roots = np.where(rho[..., np.newaxis] <= TOLERANCE * scale, np.sign(roots), roots)
     sine = np.clip(evaluate(g, roots) / thigh, -1.0, 1.0)
     side = np.where(evaluate(x_polynomial, roots) * evaluate(k, roots) < 0, -1.0, 1.0)
+    # Two equal roots are those of either side.
+    side[..., 1:] = np.where(roots[..., 1:] == roots[..., :-1], -side[..., :-1], side[..., 1:])
     joint_2 = np.arctan2(sine, side * np.sqrt(1.0 - sine**2))
     joint_4 = np.arccos(roots)
     joint_2, joint_4 = _polished(leg, rho, p[..., 2], value, joint_2, joint_4)

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 TOUCHES = 1e-13
-"""A polynomial that turns back so near to zero, over the sum of its coefficients, touches it: one root for two."""
+"""A polynomial that turns back so near to zero, over the sum of its coefficients, touches it: two equal roots."""
 
 
 def real_roots(coefficients: Array, low: float, high: float) -> Array:
@@ -28,12 +28,15 @@ def real_roots(coefficients: Array, low: float, high: float) -> Array:
     extrema = real_roots(slopes, low, high) if degree > 1 else ends[..., :0]
     edges = np.sort(np.concatenate([ends, np.where(np.isnan(extrema), high, extrema)], axis=-1), axis=-1)
     values = evaluate(coefficients, edges)
-    scale = np.sum(np.abs(coefficients), axis=-1, keepdims=True)
-    signs = np.where(np.abs(values) <= TOUCHES * scale, 0.0, np.sign(values))
+    signs = np.sign(values)
     left, right = edges[..., :-1], edges[..., 1:]
     crosses = signs[..., :-1] * signs[..., 1:] < 0
-    touches = (signs[..., 1:] == 0) & (left < right)
-    found = np.where(touches, right, np.nan)
+    # An extremum at zero but for rounding, from which no root is found on either side.
+    touches = np.abs(values) <= TOUCHES * np.sum(np.abs(coefficients), axis=-1, keepdims=True)
+    touches[..., :-1] &= ~crosses
+    touches[..., 1:] &= ~crosses
+    touches &= (edges > low) & (edges < high)
+    found = np.where(touches[..., :-1], left, np.where(touches[..., 1:], right, np.nan))
     if crosses.any():
         owners = np.broadcast_to(coefficients[..., np.newaxis, :], (*crosses.shape, degree + 1))[crosses]
         found[crosses] = _bracketed(owners, left[crosses], right[crosses], signs[..., :-1][crosses])
