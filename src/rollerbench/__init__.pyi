@@ -20,8 +20,10 @@ from .errors import ResourceError as ResourceError
 from .errors import RollerbenchError as RollerbenchError
 from .errors import RollerbenchWarning as RollerbenchWarning
 from .errors import SimulationError as SimulationError
+from .errors import UnreachableTarget as UnreachableTarget
 from .kinematics import Mobility as Mobility
 from .kinematics import WheelKinematics as WheelKinematics
+from .kinematics import legs as legs
 from .kinematics import limits as limits
 from .kinematics import odometry as odometry
 from .plant import RobotModel as RobotModel

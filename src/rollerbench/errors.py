@@ -36,6 +36,22 @@ class InfeasibleTwist(KinematicsError):
         self.skid_speeds = skid_speeds
 
 
+class UnreachableTarget(KinematicsError):
+    """A position to which a leg cannot bring its foot.
+
+    Attributes:
+        index: Index of the target, () of a single one.
+        distance: How far it is from the points in reach [m]; 0 if only limits of joints keep the foot from it.
+        limit_excess: How far joints would have to turn beyond their limits [rad]; 0 if it is out of reach anyway.
+    """
+
+    def __init__(self, message: str, index: tuple[int, ...], distance: float, limit_excess: float) -> None:
+        super().__init__(message)
+        self.index = index
+        self.distance = distance
+        self.limit_excess = limit_excess
+
+
 class SimulationError(RollerbenchError):
     """A simulation that could not go on.
 
