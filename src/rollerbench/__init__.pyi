@@ -23,6 +23,7 @@ from .errors import SimulationError as SimulationError
 from .errors import UnreachableTarget as UnreachableTarget
 from .kinematics import Mobility as Mobility
 from .kinematics import WheelKinematics as WheelKinematics
+from .kinematics import gaits as gaits
 from .kinematics import legs as legs
 from .kinematics import limits as limits
 from .kinematics import odometry as odometry

@@ -18,10 +18,10 @@ from pydrake.systems.primitives import Adder, Gain, LinearSystem, MatrixGain, Sa
 from rollerbench.description import Leg, Robot, load_robot
 from rollerbench.description.inertia import GRAVITY
 from rollerbench.errors import KinematicsError
+from rollerbench.kinematics.gaits.plan import LegCommand, LegFeedback, LegMode, LegPlan
+from rollerbench.kinematics.gaits.planner import LegPlanner
+from rollerbench.kinematics.gaits.tracker import Tracked, track
 from rollerbench.kinematics.legs.group import LegGroup
-from rollerbench.kinematics.legs.plan import LegCommand, LegFeedback, LegMode, LegPlan
-from rollerbench.kinematics.legs.planner import LegPlanner
-from rollerbench.kinematics.legs.tracker import Tracked, track
 from rollerbench.plant import RobotModel
 from rollerbench.sdf.servo import leg_gains
 

@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 from rollerbench.description import Robot
 from rollerbench.errors import KinematicsError
 from rollerbench.kinematics import odometry
-from rollerbench.kinematics.legs import changes, wheeling
-from rollerbench.kinematics.legs.gaits import Gait, Schedule, gait_of, schedule
+from rollerbench.kinematics.gaits import changes, wheeling
+from rollerbench.kinematics.gaits.gait import Gait, Schedule, gait_of, schedule
+from rollerbench.kinematics.gaits.plan import LegCommand, LegFeedback, LegMode, LegPlan
+from rollerbench.kinematics.gaits.smooth import Follower, bump, quintic
 from rollerbench.kinematics.legs.group import Hold, LegGroup
-from rollerbench.kinematics.legs.plan import LegCommand, LegFeedback, LegMode, LegPlan
-from rollerbench.kinematics.legs.smooth import Follower, bump, quintic
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]

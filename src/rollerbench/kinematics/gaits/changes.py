@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from rollerbench.description import Posture
+from rollerbench.kinematics.gaits.smooth import quintic
 from rollerbench.kinematics.legs.group import Hold, LegGroup
-from rollerbench.kinematics.legs.smooth import quintic
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollerbench.description import Posture
-from rollerbench.kinematics.legs.changes import Change
-from rollerbench.kinematics.legs.gaits import Gait, Schedule
+from rollerbench.kinematics.gaits.changes import Change
+from rollerbench.kinematics.gaits.gait import Gait, Schedule
+from rollerbench.kinematics.gaits.smooth import Follower
+from rollerbench.kinematics.gaits.wheeling import Wheeling
 from rollerbench.kinematics.legs.group import Hold
-from rollerbench.kinematics.legs.smooth import Follower
-from rollerbench.kinematics.legs.wheeling import Wheeling
 
 Array = NDArray[np.float64]
 
