@@ -40,6 +40,7 @@ class GaitPlanner(LeafSystem):
             connected.
         mode: a `LegMode`; the one it was made with if not connected.
         correction (3): twist that brings the robot back to its reference while it moves; 0 if not connected.
+        level (3): height [m], roll and pitch [rad] by which the legs shall overdo the pose; 0 if not connected.
         tracked: what the legs do, from `LegTracker`; as planned if not connected.
         foot_loads (n_legs): measured loads of the feet [N], with which it feels its way over uneven ground; if not
             connected the ground is level.
@@ -49,6 +50,7 @@ class GaitPlanner(LeafSystem):
         foot_positions (3 n_legs): centres of the feet's wheels in B then [m].
         q_xyt (3): where the accepted twists alone lead to: the reference [m, m, rad].
         v_xyw_B (3): the accepted twist, smoothed [m/s, m/s, rad/s].
+        desired (6): x, y, z [m], roll, pitch, yaw [rad] of the body on its reference, offset included.
     """
 
     def __init__(
@@ -75,6 +77,7 @@ class GaitPlanner(LeafSystem):
             "body_offset": self.DeclareVectorInputPort("body_offset", 6),
             "mode": self.DeclareAbstractInputPort("mode", Value(self._mode)),
             "correction": self.DeclareVectorInputPort("correction", 3),
+            "level": self.DeclareVectorInputPort("level", 3),
             "tracked": self.DeclareAbstractInputPort("tracked", Value(_standing(self.planner, start))),
             "foot_loads": self.DeclareVectorInputPort("foot_loads", count),
             "fault": self.DeclareVectorInputPort("fault", 1),
@@ -85,6 +88,7 @@ class GaitPlanner(LeafSystem):
         self.DeclareStateOutputPort("plan", index)
         self.DeclareVectorOutputPort("foot_positions", 3 * count, self._calc_feet, own)
         self.DeclareVectorOutputPort("q_xyt", 3, lambda c, out: out.SetFromVector(self.plan(c).reference), own)
+        self.DeclareVectorOutputPort("desired", 6, lambda c, out: out.SetFromVector(self.plan(c).desired), own)
         self.DeclareVectorOutputPort("v_xyw_B", 3, lambda c, out: out.SetFromVector(self.plan(c).twist.value), own)
 
     def plan(self, context: Context) -> LegPlan:
@@ -102,6 +106,7 @@ class GaitPlanner(LeafSystem):
             offset=self._eval(context, "body_offset", np.zeros(6)),
             mode=self._eval(context, "mode", self._mode),
             correction=self._eval(context, "correction", np.zeros(3)),
+            level=self._eval(context, "level", np.zeros(3)),
         )
         tracked = self._eval(context, "tracked", None) or _planned(self.planner, plan)
         q, _ = tracked.next(self._period)
@@ -208,15 +213,19 @@ class LegTracker(LeafSystem):
     """
 
     def __init__(
-        self, robot: Robot | str | Path | Mapping[str, Any], period: float = PERIOD, mode: LegMode | None = None
+        self,
+        robot: Robot | str | Path | Mapping[str, Any],
+        period: float = PERIOD,
+        mode: LegMode | None = None,
+        up_W: ArrayLike = (0.0, 0.0, 1.0),
     ):
-        """Makes the system for a robot; arguments as of `GaitPlanner`."""
+        """Makes the system for a robot; arguments as of `GaitPlanner`, and the unit vector (3,) against gravity."""
         super().__init__()
         _require_period(period)
         self._planner, self._period = LegPlanner(load_robot(robot)), period
         start = self._planner.start(mode)
         self._group: LegGroup = self._planner.group
-        self._start = start
+        self._start, self._up = start, np.asarray(up_W, dtype=np.float64)
         self._plan = self.DeclareAbstractInputPort("plan", Value(start))
         first = _standing(self._planner, start)
         index = self.DeclareAbstractState(Value(_Reached(first.q, first.wheel, start)))
@@ -257,10 +266,10 @@ class LegTracker(LeafSystem):
         plan: LegPlan = self._plan.Eval(context)
         tracked: Tracked = self._tracked.Eval(context)
         pose, (q, _) = plan.X_PB, tracked.next(self._period)
-        frames, up_B = self._group.frames(q), pose[2, :3]
+        frames, normal_B, up_B = self._group.frames(q), pose[2, :3], pose[:3, :3].T @ self._up
         ahead = np.array([*plan.twist.rate[:2], 0.0])
         forces = self._group.shared_load(frames, plan.load, GRAVITY * up_B + ahead)
-        joints, wheels = self._group.contact_efforts(frames, forces, up_B)
+        joints, wheels = self._group.contact_efforts(frames, forces, normal_B)
         output.SetFromVector(self._group.to_vector(joints + self._group.gravity_efforts(frames, up_B), wheels))
 
 

@@ -44,12 +44,14 @@ class LegCommand:
         offset: Pose (6,) of the body from where its posture has it: x, y, z [m], roll, pitch, yaw [rad].
         mode: How.
         correction: Twist (3,) that brings the robot back to its reference while it moves [m/s, m/s, rad/s].
+        level: Height, roll and pitch (3,) by which the legs shall overdo the pose, for what they give way [m, rad, rad].
     """
 
     v_xyw_B: Array
     offset: Array
     mode: LegMode
     correction: Array = field(default_factory=lambda: np.zeros(3))
+    level: Array = field(default_factory=lambda: np.zeros(3))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -82,6 +84,7 @@ class LegPlan:
         reference: The pose (3,) that the accepted twist alone leads to [m, m, rad].
         twist: Body twist (3,) [m/s, m/s, rad/s], and its rate.
         offset: Offset (6,) of the body (see `LegCommand`), and its rate.
+        level: What the pose overdoes (3,) (see `LegCommand`).
         height: Height of Bo over the ground, without the offset [m].
         ground: Mean height (1,) of the ground under the feet [m], and its rate.
         feet_P: Lowest points (k, 3) of the feet's wheels [m].
@@ -105,6 +108,7 @@ class LegPlan:
     reference: Array
     twist: Follower
     offset: Follower
+    level: Array
     height: float
     ground: Follower
     feet_P: Array
@@ -137,11 +141,21 @@ class LegPlan:
         """Pose (4, 4) of the body in P."""
         x, y, yaw = self.q_xyt
         dx, dy, dz, roll, pitch, turn = self.offset.value
+        dz, roll, pitch = np.array([dz, roll, pitch]) + self.level
         cos, sin = np.cos(yaw), np.sin(yaw)
         pose = np.eye(4)
         pose[:3, :3] = rotation(roll, pitch, yaw + turn)
         pose[:3, 3] = (x + cos * dx - sin * dy, y + sin * dx + cos * dy, self.height + dz + self.ground.value[0])
         return pose
+
+    @property
+    def desired(self) -> Array:
+        """Where the body shall be (6,): x, y, z [m], roll, pitch, yaw [rad], on its reference."""
+        x, y, yaw = self.reference
+        dx, dy, dz, roll, pitch, turn = self.offset.value
+        cos, sin = np.cos(yaw), np.sin(yaw)
+        height = self.height + dz + self.ground.value[0]
+        return np.array([x + cos * dx - sin * dy, y + sin * dx + cos * dy, height, roll, pitch, yaw + turn])
 
 
 def rotation(roll: float, pitch: float, yaw: float) -> Array:

@@ -106,6 +106,7 @@ class LegPlanner:
             reference=np.zeros(3),
             twist=Follower(np.zeros(3), np.zeros(3)),
             offset=Follower(np.zeros(6), np.zeros(6)),
+            level=np.zeros(3),
             height=self._height[mode.posture],
             ground=Follower(np.zeros(1), np.zeros(1)),
             feet_P=feet,
@@ -159,6 +160,7 @@ class LegPlanner:
             q_xyt=odometry.integrate(plan.q_xyt, moved, dt),
             reference=odometry.integrate(plan.reference, mean, dt),
             twist=twist,
+            level=command.level,
             offset=plan.offset.follow(wanted, dt, OFFSET_TIME),
         )
         match plan.activity:

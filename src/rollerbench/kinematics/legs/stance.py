@@ -1,0 +1,93 @@
+"""Odometry of legs: where the body is, from the joints of the legs that stand."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollerbench.kinematics.legs.body_pose import body_pose_from_stance
+from rollerbench.kinematics.legs.group import LegGroup
+
+Array = NDArray[np.float64]
+
+BEARS = 0.2
+"""Feet that bear this share of their load count as standing [-]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class StanceEstimate:
+    """Where body and feet are believed to be.
+
+    Attributes:
+        X_WB: Pose (4, 4) of the body.
+        centers_W: Centres (k, 3) of the feet's wheels [m].
+        stood: Which feet (k,) stood at that moment.
+        slipped: Which feet (k,) were found to have slipped.
+    """
+
+    X_WB: Array
+    centers_W: Array
+    stood: NDArray[np.bool_]
+    slipped: NDArray[np.bool_]
+
+    def __deepcopy__(self, memo: dict[int, object]) -> "StanceEstimate":
+        """Itself: nobody changes it."""
+        return self
+
+
+def stance_start(group: LegGroup, q: Array, X_WB: Array) -> StanceEstimate:
+    """The estimate of a robot whose pose is known, at joint angles q (k, n)."""
+    centers = group.frames(q)[:, -1, :3, 3] @ X_WB[:3, :3].T + X_WB[:3, 3]
+    every = np.ones(len(centers), dtype=bool)
+    return StanceEstimate(X_WB=X_WB, centers_W=centers, stood=every, slipped=~every)
+
+
+def stance_next(
+    group: LegGroup, estimate: StanceEstimate, joints: tuple[Array, Array], wheel_speed: Array, load: Array, dt: float
+) -> StanceEstimate:
+    """The estimate a moment dt later [s].
+
+    Feet that stand are where they were, but for what their wheels rolled since: with the angular velocity w of the
+    wheel over the ground its centre moves at w x R z. The pose is the one that fits them best.
+
+    Args:
+        group: The legs.
+        estimate: The estimate before.
+        joints: Measured joint angles and rates (k, n) [rad, rad/s].
+        wheel_speed: Measured wheel speeds (k,) [rad/s].
+        load: Shares (k,) of their load that the feet bear.
+        dt: Time since then [s].
+    """
+    q, rates = joints
+    frames = group.frames(q)
+    places = frames[:, -1, :3, 3]
+    stands = load > BEARS
+    fit = stands & estimate.stood
+    rotation = estimate.X_WB[:3, :3]
+    centers = estimate.centers_W
+    if fit.sum() >= 3:
+        spin = (group.jacobian(frames)[:, :3] @ rates[..., np.newaxis])[..., 0]
+        spin = (spin + wheel_speed[:, np.newaxis] * frames[:, -1, :3, 2]) @ rotation.T + _body_spin(
+            group, frames, rates, estimate, fit
+        )
+        rolled = np.column_stack([spin[:, 1], -spin[:, 0], np.zeros(len(spin))]) * group.wheel_radius[:, np.newaxis]
+        centers = centers + dt * rolled * fit[:, np.newaxis]
+        found = body_pose_from_stance(places[fit], centers[fit], robust=fit.sum() >= 5)
+        pose, slipped = found.X_WB, np.zeros(len(fit), dtype=bool)
+        slipped[fit] = found.slipped
+    else:
+        pose, slipped = estimate.X_WB, np.zeros(len(fit), dtype=bool)
+    seen = places @ pose[:3, :3].T + pose[:3, 3]
+    # A foot that slipped stands where it is now.
+    keeps = (fit & ~slipped)[:, np.newaxis]
+    return replace(estimate, X_WB=pose, centers_W=np.where(keeps, centers, seen), stood=stands, slipped=slipped)
+
+
+def _body_spin(group: LegGroup, frames: Array, rates: Array, estimate: StanceEstimate, fit: NDArray[np.bool_]) -> Array:
+    """Angular velocity (3,) of the body in W, at which standing feet move least: p' = -(w x p) - v in B."""
+    places = frames[fit, -1, :3, 3]
+    velocity = (group.jacobian(frames)[fit, 3:] @ rates[fit, :, np.newaxis])[..., 0]
+    arms, flow = places - places.mean(axis=0), velocity - velocity.mean(axis=0)
+    inertia = np.sum(arms**2) * np.eye(3) - arms.T @ arms
+    spin: Array = np.linalg.solve(inertia, -np.cross(arms, flow).sum(axis=0))
+    return estimate.X_WB[:3, :3] @ spin
