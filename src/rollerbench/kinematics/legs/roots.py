@@ -10,7 +10,7 @@ TOUCHES = 1e-13
 
 
 def real_roots(coefficients: Array, low: float, high: float) -> Array:
-    """Roots between low and high: between two neighbouring extrema a polynomial is monotone and has at most one.
+    """Roots inside an interval: between two neighbouring extrema a polynomial is monotone and has at most one.
 
     The extrema are the roots of the derivative, found in the same way. Leading coefficients may vanish.
 
