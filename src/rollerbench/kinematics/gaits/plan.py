@@ -44,7 +44,7 @@ class LegCommand:
         offset: Pose (6,) of the body from where its posture has it: x, y, z [m], roll, pitch, yaw [rad].
         mode: How.
         correction: Twist (3,) that brings the robot back to its reference while it moves [m/s, m/s, rad/s].
-        level: Height, roll and pitch (3,) by which the legs shall overdo the pose, for what they give way [m, rad, rad].
+        level: Height [m], roll and pitch [rad] (3,) by which the legs shall overdo the pose, for what they give way.
     """
 
     v_xyw_B: Array

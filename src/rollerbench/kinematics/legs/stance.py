@@ -13,6 +13,9 @@ Array = NDArray[np.float64]
 BEARS = 0.2
 """Feet that bear this share of their load count as standing [-]."""
 
+SUSPECT = 0.003
+"""A foot so far from where the others put it may have slipped [m]."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class StanceEstimate:
@@ -72,7 +75,9 @@ def stance_next(
         )
         rolled = np.column_stack([spin[:, 1], -spin[:, 0], np.zeros(len(spin))]) * group.wheel_radius[:, np.newaxis]
         centers = centers + dt * rolled * fit[:, np.newaxis]
-        found = body_pose_from_stance(places[fit], centers[fit], robust=fit.sum() >= 5)
+        found = body_pose_from_stance(places[fit], centers[fit], robust=False)
+        if fit.sum() >= 4 and found.residuals.max() > SUSPECT:
+            found = body_pose_from_stance(places[fit], centers[fit])
         pose, slipped = found.X_WB, np.zeros(len(fit), dtype=bool)
         slipped[fit] = found.slipped
     else:

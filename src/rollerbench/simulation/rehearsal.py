@@ -1,0 +1,101 @@
+"""A gait command carried out by ideal legs, before anything is simulated: can they, and where does it lead?"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollerbench.description import Robot
+from rollerbench.errors import DescriptionError, KinematicsError
+from rollerbench.kinematics.gaits import LegCommand, LegFeedback, LegPlan, LegPlanner, track
+from rollerbench.kinematics.legs import static_margin
+from rollerbench.simulation.leg_command import command_at
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Rehearsal:
+    """What ideal legs made of a command.
+
+    Attributes:
+        plans: The plans, a period of control apart, from time 0 on.
+        margins: Static stability margins (n,) [m].
+    """
+
+    plans: list[LegPlan]
+    margins: Array
+
+    @property
+    def time(self) -> Array:
+        """Times (n,) [s]."""
+        return np.array([plan.time for plan in self.plans])
+
+    @property
+    def reference(self) -> Array:
+        """Poses (n, 3) to which the command leads [m, m, rad]."""
+        return np.array([plan.reference for plan in self.plans])
+
+    @property
+    def twist(self) -> Array:
+        """Its twists (n, 3) [m/s, m/s, rad/s]."""
+        return np.array([plan.twist.value for plan in self.plans])
+
+
+def rehearse(
+    robot: Robot, course: list[tuple[float, LegCommand]], duration: float, period: float, gravity: Array, name: str
+) -> Rehearsal:
+    """Carries out a course of commands with ideal legs on level ground.
+
+    Args:
+        robot: The robot.
+        course: See `GaitCommand.course`.
+        duration: For how long [s].
+        period: Period of control [s].
+        gravity: Acceleration (3,) in W [m/s2].
+        name: Name of the scenario, for messages.
+
+    Raises:
+        DescriptionError: a command is beyond the legs' reach or a joint's limits, or lets the robot tip over.
+    """
+    planner = LegPlanner(robot)
+    plan = planner.start(course[0][1].mode)
+    q, wheel = planner.joints(plan.posture.name), np.zeros(len(plan.load))
+    feedback = LegFeedback(q=q, q_rate=0 * q, roll_P=np.zeros((len(q), 3)))
+    plans, margins = [plan], [_margin(planner, plan, q, gravity)]
+    for _ in range(round(duration / period)):
+        try:
+            following = planner.advance(plan, period, command_at(course, plan.time), feedback)
+        except KinematicsError as error:
+            raise DescriptionError(f"{name}: {error}") from error
+        poses, places = (plan.X_PB, following.X_PB), (planner.centers_B(plan), planner.centers_B(following))
+        done = track(planner.group, q, wheel, poses, places, following.hold, following.swing < 0, period)
+        plan = following
+        if done.fault or plan.status:
+            raise DescriptionError(f"{name}: at t = {plan.time:.2f} s {done.fault or plan.status}; {_advice(plan)}")
+        q, wheel = done.next(period)
+        margins.append(_margin(planner, plan, q, gravity))
+        if margins[-1] < 0:
+            flying = ", ".join(leg.name for leg, swing in zip(robot.legs, plan.swing, strict=True) if swing >= 0)
+            raise DescriptionError(
+                f"{name}: at t = {plan.time:.2f} s the robot would tip over: with {flying or 'no leg'} in the air its "
+                f"centre of mass is {-1e3 * margins[-1]:.0f} mm outside the support polygon; accepted: a gait with more "
+                "feet on the ground (wave), or a smaller stride"
+            )
+        feedback = LegFeedback(q=q, q_rate=done.q_rate, roll_P=done.roll_P)
+        plans.append(plan)
+    return Rehearsal(plans=plans, margins=np.array(margins))
+
+
+def _advice(plan: LegPlan) -> str:
+    share = np.abs(plan.accepted).max() / max(np.abs(plan.request).max(), 1e-12)
+    if 0 < share < 1:
+        slower = ", ".join(f"{value:.3g}" for value in plan.accepted)
+        return f"accepted: up to v_xyw_B = [{slower}], or a shorter period"
+    return "accepted: a slower or smaller motion"
+
+
+def _margin(planner: LegPlanner, plan: LegPlan, q: Array, gravity: Array) -> float:
+    pose = plan.X_PB
+    com = pose[:3, :3] @ planner.group.center_of_mass(planner.group.frames(q)) + pose[:3, 3]
+    return static_margin(plan.feet_P[plan.swing < 0], com, gravity)
