@@ -2,8 +2,9 @@
 
 import logging
 import math
+from collections.abc import Sequence
 
-from pydrake.geometry import AddContactMaterial, HalfSpace, ProximityProperties, Sphere
+from pydrake.geometry import AddContactMaterial, Box, HalfSpace, ProximityProperties, Sphere
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
 from pydrake.multibody.tree import RigidBody, SpatialInertia
@@ -19,8 +20,20 @@ BUMPS = "ground_bumps"
 """Name of the body that carries the ground's bumps."""
 
 
+STEP_COLOR = [0.62, 0.66, 0.70, 1.0]
+"""Colour of steps."""
+
+STEPS, STEP_WIDTH = "ground_steps", 20.0
+"""Name of the body that carries the ground's steps, and their width [m]."""
+
+
 def add_ground(
-    plant: MultibodyPlant, *, friction: float = 0.8, slope_deg: float = 0.0, bumps: Bumps | None = None
+    plant: MultibodyPlant,
+    *,
+    friction: float = 0.8,
+    slope_deg: float = 0.0,
+    bumps: Bumps | None = None,
+    steps: Sequence[tuple[float, float, float]] = (),
 ) -> RigidBody | None:
     """Registers level, rigid ground at z = 0 of the world with a plant that is not finalized.
 
@@ -31,6 +44,7 @@ def add_ground(
         friction: Coefficient of friction of the ground; with a wheel's it combines to 2ab/(a+b).
         slope_deg: Inclination along x [deg].
         bumps: What rises above the plane.
+        steps: Start and end along x, and height [m], of steps across the way.
 
     Returns:
         The body that carries the bumps, if there are any.
@@ -47,6 +61,14 @@ def add_ground(
         slope = math.radians(slope_deg)
         strength = plant.gravity_field().gravity_vector()[2]
         plant.mutable_gravity_field().set_gravity_vector([strength * math.sin(slope), 0.0, strength * math.cos(slope)])
+    if steps:
+        body = plant.AddRigidBody(STEPS, plant.AddModelInstance(STEPS), SpatialInertia.Zero())
+        plant.WeldFrames(plant.world_frame(), body.body_frame())
+        for index, (start, end, height) in enumerate(steps):
+            # Reaching below the plane, so that no edge lies in it.
+            box, place = Box(end - start, STEP_WIDTH, 2 * height), RigidTransform([0.5 * (start + end), 0.0, 0.0])
+            plant.RegisterCollisionGeometry(body, place, box, f"step_{index}", properties)
+            plant.RegisterVisualGeometry(body, place, box, f"step_{index}", STEP_COLOR)
     return _add_bumps(plant, bumps, properties) if bumps is not None and len(bumps.radii) else None
 
 

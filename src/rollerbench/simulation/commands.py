@@ -12,6 +12,7 @@ from rollerbench.description.part import NonNegative, Number, Part, Positive, Ve
 from rollerbench.description.problems import Problem
 from rollerbench.kinematics import WheelKinematics, paths
 from rollerbench.kinematics.profile import Profile, held_with_ramps, sum_of_steps
+from rollerbench.simulation.leg_command import GaitCommand
 
 STEERING_PAUSE = 0.5
 """Rest between the legs of a path in which steered wheels turn to the next [s]."""
@@ -321,7 +322,7 @@ class PathCommand(_AlongPath):
 
 
 Command = Annotated[
-    TwistCommand | WheelSpeedsCommand | WheelEffortsCommand | WaypointsCommand | PathCommand,
+    TwistCommand | WheelSpeedsCommand | WheelEffortsCommand | WaypointsCommand | PathCommand | GaitCommand,
     Field(discriminator="type"),
 ]
 

@@ -3,8 +3,10 @@
 from collections.abc import Mapping
 from typing import Any, TypeVar
 
-from pydrake.multibody.plant import MultibodyPlantConfig
+from pydrake.geometry import SceneGraph
+from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant, MultibodyPlantConfig
 from pydrake.systems.analysis import SimulatorConfig
+from pydrake.systems.framework import DiagramBuilder
 
 from rollerbench.description.problems import Problem
 from rollerbench.errors import DescriptionError
@@ -39,6 +41,19 @@ def plant_config(scenario: Scenario) -> MultibodyPlantConfig:
     if fast:
         config.sap_near_rigid_threshold = NEAR_RIGID
     return _apply("plant", config, settings.model_extra or {})
+
+
+def add_plant(builder: DiagramBuilder, scenario: Scenario) -> tuple[MultibodyPlant, SceneGraph]:
+    """Adds a scenario's plant, connected to a scene graph.
+
+    Raises:
+        DescriptionError: Drake refuses a setting.
+    """
+    config = plant_config(scenario)
+    try:
+        return AddMultibodyPlant(config, builder)
+    except (RuntimeError, SystemExit) as error:
+        raise DescriptionError(f"plant: Drake refuses these settings: {error}") from error
 
 
 def simulator_config(scenario: Scenario) -> SimulatorConfig:

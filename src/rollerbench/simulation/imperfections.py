@@ -131,6 +131,7 @@ class Errors(Part):
         encoder_counts: Counts in one turn of a driven wheel of the encoder on its motor; without it speeds are
             measured continuously.
         ground_bumps: What rises above the level ground.
+        lost_legs: Legs whose motors give no torque any more, by name, and from when on [s].
     """
 
     radius_scale: dict[str, Positive] = Field(default_factory=dict)
@@ -142,9 +143,18 @@ class Errors(Part):
     backlash_deg: dict[str, Annotated[NonNegative, Field(le=LARGEST_BACKLASH_DEG)]] = Field(default_factory=dict)
     encoder_counts: dict[str, Annotated[PositiveInt, Field(le=MOST_COUNTS)]] = Field(default_factory=dict)
     ground_bumps: GroundBumps | None = None
+    lost_legs: dict[str, NonNegative] = Field(default_factory=dict)
 
     def problems(self, robot: Robot) -> Iterator[Problem]:
         """Names that are no wheels of the robot, or none with a motor, and bumps too high for it."""
+        legs = [leg.name for leg in robot.legs]
+        for name in self.lost_legs:
+            if name not in legs:
+                message = f"not a leg of {robot.name}; accepted: {', '.join(legs) or 'none, it has no legs'}"
+                yield Problem(("errors", "lost_legs", name), message)
+        if legs:
+            yield from self._of_wheels(robot)
+            return
         driven = [wheel.name for wheel in robot.driven_wheels]
         for field in (*OF_THE_ROBOT, *OF_THE_DRIVETRAIN):
             kind, names = ("driven wheel", driven) if field in OF_THE_DRIVETRAIN else ("wheel", robot.wheel_names)
@@ -159,6 +169,13 @@ class Errors(Part):
             if self.ground_bumps.height > min(limits):
                 message = f"too high for the wheels of {robot.name}; accepted: up to {min(limits):.4g}"
                 yield Problem(("errors", "ground_bumps", "height"), message, self.ground_bumps.height)
+
+    def _of_wheels(self, robot: Robot) -> Iterator[Problem]:
+        """What a robot on legs cannot have."""
+        for field in (*OF_THE_ROBOT, *OF_THE_DRIVETRAIN, "ground_bumps"):
+            if field != "center_of_mass" and getattr(self, field):
+                message = f"of wheels, and {robot.name} stands on legs; accepted: center_of_mass, lost_legs"
+                yield Problem(("errors", field), message)
 
     def drives(self, robot: Robot) -> list[WheelDrive] | None:
         """Drivetrains of the driven wheels, in the order of robot.yaml; None if all are perfect."""

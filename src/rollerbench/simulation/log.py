@@ -76,7 +76,7 @@ def provenance(scenario: Scenario, engine: str) -> dict[str, Any]:
         **({"mujoco": version("mujoco")} if engine == "mujoco" else {}),
         "robot_description": scenario.robot.model_dump(mode="json", exclude_none=True),
         "injected": {name: robot.model_dump(mode="json", exclude_none=True) for name, robot in injected.items()},
-        "rollers": scenario.controller.rollers,
+        "rollers": scenario.wheel_control.rollers,
         "drivetrain": scenario.errors.drives(scenario.robot) is not None,
     }
 

@@ -31,7 +31,7 @@ def check(scenario: Scenario) -> None:
     """
     if importlib.util.find_spec("mujoco") is None:
         raise ResourceError(f"engine = {scenario.engine!r}: MuJoCo is missing: pip install 'rollerbench[mujoco]'")
-    if scenario.motion.wheel_efforts is not None or scenario.controller.servo != "implicit":
+    if scenario.motion.wheel_efforts is not None or scenario.wheel_control.servo != "implicit":
         raise DescriptionError(
             f"engine = {scenario.engine!r}: torques of wheels are commanded in Drake only; accepted: engine: drake, or "
             "another command, with servo: implicit"
@@ -104,7 +104,7 @@ def simulate(scenario: Scenario, *, progress: Progress | None = None) -> Simulat
 
 
 def _gains(scenario: Scenario) -> ServoGains:
-    return servo_gains(scenario.robot, time_constant=scenario.controller.servo_time_constant)
+    return servo_gains(scenario.robot, time_constant=scenario.wheel_control.servo_time_constant)
 
 
 def _control(scenario: Scenario, times: Array) -> Array:

@@ -72,15 +72,16 @@ def rehearse(
         done = track(planner.group, q, wheel, poses, places, following.hold, following.swing < 0, period)
         plan = following
         if done.fault or plan.status:
-            raise DescriptionError(f"{name}: at t = {plan.time:.2f} s {done.fault or plan.status}; {_advice(plan)}")
+            why = done.fault or plan.status
+            raise DescriptionError(f"{name}: at t = {plan.time:.2f} s {why}; {_advice(plan)}")
         q, wheel = done.next(period)
         margins.append(_margin(planner, plan, q, gravity))
         if margins[-1] < 0:
             flying = ", ".join(leg.name for leg, swing in zip(robot.legs, plan.swing, strict=True) if swing >= 0)
             raise DescriptionError(
                 f"{name}: at t = {plan.time:.2f} s the robot would tip over: with {flying or 'no leg'} in the air its "
-                f"centre of mass is {-1e3 * margins[-1]:.0f} mm outside the support polygon; accepted: a gait with more "
-                "feet on the ground (wave), or a smaller stride"
+                f"centre of mass is {-1e3 * margins[-1]:.0f} mm outside the support polygon; accepted: a gait with "
+                "more feet on the ground (wave), or a smaller stride"
             )
         feedback = LegFeedback(q=q, q_rate=done.q_rate, roll_P=done.roll_P)
         plans.append(plan)

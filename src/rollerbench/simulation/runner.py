@@ -10,7 +10,7 @@ from pydrake.geometry import Meshcat
 
 from rollerbench.errors import RollerbenchWarning, SimulationError
 from rollerbench.recording import Recording
-from rollerbench.simulation import drake_engine, mujoco_engine
+from rollerbench.simulation import drake_engine, leg_engine, mujoco_engine
 from rollerbench.simulation.folder import check_folder, write_folder
 from rollerbench.simulation.log import Progress, Simulated
 from rollerbench.simulation.scenario import Scenario, load_scenario
@@ -112,6 +112,8 @@ def run(
 def _simulated(scenario: Scenario, meshcat: Meshcat | None = None, progress: Progress | None = None) -> Simulated:
     if scenario.engine == "mujoco":
         return mujoco_engine.simulate(scenario, progress=progress)
+    if scenario.robot.legs:
+        return leg_engine.simulate(scenario, meshcat=meshcat, progress=progress)
     return drake_engine.simulate(scenario, meshcat=meshcat, progress=progress)
 
 

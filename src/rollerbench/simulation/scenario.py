@@ -2,18 +2,20 @@
 
 import copy
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import BeforeValidator, ConfigDict, Field, ValidationInfo, model_validator
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
 from rollerbench.description import Robot, load_robot
 from rollerbench.description.files import read_yaml, validate
+from rollerbench.description.inertia import GRAVITY
 from rollerbench.description.part import Flag, Name, NonNegative, Number, Part, Positive
 from rollerbench.description.problems import Problem, refuse
 from rollerbench.errors import DescriptionError, RollerbenchError
@@ -27,6 +29,8 @@ from rollerbench.sdf.servo import DRIVE_TIME_CONSTANT
 from rollerbench.sdf.window import DEFAULT_SIZE, size_on_bumps
 from rollerbench.simulation.commands import Command, WheelEffortsCommand, WheelSpeedsCommand
 from rollerbench.simulation.imperfections import Errors
+from rollerbench.simulation.leg_command import GaitCommand
+from rollerbench.simulation.rehearsal import Rehearsal, rehearse
 
 
 class PidSettings(Part):
@@ -58,6 +62,19 @@ class OpenLoop(Part):
     pid: PidSettings | None = None
     servo_time_constant: Positive = DRIVE_TIME_CONSTANT
     rollers: Literal["textbook", "finite"] = "textbook"
+
+
+class LegControl(Part):
+    """Joint torques of legs from a plan of their feet (`rollerbench.systems.GaitPlanner`).
+
+    Attributes:
+        closed_loop: Whether stance odometry brings the body back to its reference.
+        period: Period of control [s], a multiple of the plant's step.
+    """
+
+    type: Literal["legs"] = "legs"
+    closed_loop: Flag = False
+    period: Annotated[Positive, Field(ge=1e-4, le=0.1)] = 0.01
 
 
 UNFIT = {
@@ -92,6 +109,26 @@ class PlantSettings(Part):
     contact_approximation: Annotated[Literal["lagged", "similar", "fast"], BeforeValidator(_no_creep)] = "lagged"
 
 
+class GroundStep(Part):
+    """A step across the robot's way, for robots on legs.
+
+    Attributes:
+        start: Where it begins along x [m].
+        end: Where it ends along x [m].
+        height: Height [m].
+    """
+
+    start: Number
+    end: Number
+    height: Positive
+
+    @model_validator(mode="after")
+    def _has_a_length(self) -> Self:
+        if self.end <= self.start:
+            raise ValueError(f"end = {self.end:g}: accepted: more than start = {self.start:g}")
+        return self
+
+
 class Ground(Part):
     """What the robot stands on.
 
@@ -100,11 +137,19 @@ class Ground(Part):
         slope_deg: Inclination; the world's x axis points uphill.
         roll_resistance: Rolling resistance over load, of wheels and of rollers along the ground. It falls off near
             rest, so it slows a robot on a slope but does not hold it.
+        steps: Steps of which a robot on legs knows nothing; it feels them with its feet.
     """
 
     friction: Positive = 0.8
     slope_deg: Annotated[Number, Field(gt=-90, lt=90)] = 0.0
     roll_resistance: Annotated[Number, Field(ge=0, lt=1)] = 0.0
+    steps: tuple[GroundStep, ...] = ()
+
+    @property
+    def up_W(self) -> NDArray[np.float64]:
+        """Unit vector (3,) against gravity in W, whose z axis is the ground's normal."""
+        slope = math.radians(self.slope_deg)
+        return np.array([math.sin(slope), 0.0, math.cos(slope)])
 
 
 class SimulatorSettings(Part):
@@ -154,7 +199,7 @@ class Scenario(Part):
         robot: The robot; in YAML its name, a path relative to the scenario's file, or its description.
         duration: Simulated time [s].
         command: What the robot is asked to do.
-        controller: How the command becomes wheel speeds.
+        controller: How the command becomes wheel speeds; or with robots on legs, joint torques.
         plant: How Drake simulates.
         ground: What the robot stands on.
         errors: What differs from robot.yaml in the simulated robot.
@@ -170,7 +215,7 @@ class Scenario(Part):
     robot: Annotated[Robot, BeforeValidator(_robot_from, json_schema_input_type=str | Robot)]
     duration: Positive
     command: Command
-    controller: OpenLoop = OpenLoop()
+    controller: Annotated[OpenLoop | LegControl, Field(discriminator="type")] = OpenLoop()
     plant: PlantSettings = PlantSettings()
     ground: Ground = Ground()
     errors: Errors = Errors()
@@ -184,7 +229,8 @@ class Scenario(Part):
     def _command_fits(self) -> Self:
         problems = list(self.command.problems(self.robot, self.duration, self.plant.time_step))
         problems += self.errors.problems(self.robot)
-        if self.controller.pid is not None and self.controller.servo != "pid":
+        problems += _leg_problems(self) if self.robot.legs else _wheel_problems(self)
+        if isinstance(self.controller, OpenLoop) and self.controller.pid is not None and self.controller.servo != "pid":
             problems.append(Problem(("controller", "pid"), "gains without their controller; accepted: with servo: pid"))
         if isinstance(self.command, WheelEffortsCommand) and self.ground.slope_deg:
             message = "torques have a reference on level ground only; accepted: 0, or another command"
@@ -194,13 +240,32 @@ class Scenario(Part):
                 "torques do not go through a drivetrain; accepted: without gear_error, backlash_deg, encoder_counts"
             )
             problems.append(Problem(("errors",), message))
-        if not self.robot.driven_wheels:
-            problems.append(Problem(("robot",), "no wheel is driven; accepted: a robot with driven: true somewhere"))
         if self.plant.time_step > self.duration:
             message = f"accepted: at most the duration, {self.duration:g}"
             problems.append(Problem(("plant", "time_step"), message, self.plant.time_step))
         refuse(problems)
         return self
+
+    @property
+    def wheel_control(self) -> OpenLoop:
+        """The controller of a robot on wheels."""
+        return self.controller if isinstance(self.controller, OpenLoop) else OpenLoop()
+
+    @property
+    def leg_control(self) -> LegControl:
+        """The controller of a robot on legs."""
+        return self.controller if isinstance(self.controller, LegControl) else LegControl()
+
+    @cached_property
+    def rehearsal(self) -> Rehearsal:
+        """What ideal legs make of a gait command.
+
+        Raises:
+            DescriptionError: they cannot carry it out.
+        """
+        assert isinstance(self.command, GaitCommand)
+        course, gravity = self.command.course(self.robot), -GRAVITY * self.ground.up_W
+        return rehearse(self.robot, course, self.duration, self.leg_control.period, gravity, self.name)
 
     @cached_property
     def simulated_robot(self) -> Robot:
@@ -239,7 +304,9 @@ class Scenario(Part):
             KinematicsError: wheel speeds are commanded, and they do not determine the twist.
             DescriptionError: a wheel would have to turn faster than its max_speed.
         """
-        kinematics = WheelKinematics(self.robot, rollers=self.controller.rollers)
+        if isinstance(self.command, GaitCommand):
+            raise DescriptionError(f"{self.name}: a gait command moves legs; accepted: commands for wheels")
+        kinematics = WheelKinematics(self.robot, rollers=self.wheel_control.rollers)
         if isinstance(self.command, WheelEffortsCommand):
             dynamics = RollingDynamics(kinematics, self.ground.roll_resistance)
             efforts = self.command.wheel_effort_profile(self.robot, self.duration, self.plant.time_step)
@@ -273,6 +340,8 @@ class Scenario(Part):
 
         A wheel may turn by a sixth of its roller pitch in a step. Infinite if no wheel with rollers is commanded.
         """
+        if self.robot.legs:
+            return math.inf, None
         peak = self.motion.wheel_speeds.peak
         limits = {
             wheel.name: wheel.ring.pitch / 6 / speed
@@ -283,6 +352,34 @@ class Scenario(Part):
             return math.inf, None
         name = min(limits, key=limits.__getitem__)
         return float(limits[name]), name
+
+
+def _wheel_problems(scenario: Scenario) -> Iterator[Problem]:
+    if not scenario.robot.driven_wheels:
+        yield Problem(("robot",), "no wheel is driven; accepted: a robot with driven: true somewhere")
+    if isinstance(scenario.controller, LegControl):
+        yield Problem(("controller", "type"), "the robot has no legs; accepted: open_loop", scenario.controller.type)
+    if scenario.ground.steps:
+        yield Problem(("ground", "steps"), "for robots on legs only; accepted: errors.ground_bumps for wheels")
+
+
+def _leg_problems(scenario: Scenario) -> Iterator[Problem]:
+    name, control = scenario.robot.name, scenario.controller
+    if not isinstance(scenario.command, GaitCommand):
+        yield Problem(("command", "type"), f"{name} stands on legs; accepted: gait", scenario.command.type)
+    if isinstance(control, OpenLoop) and control != OpenLoop():
+        yield Problem(("controller", "type"), f"{name} stands on legs; accepted: legs", control.type)
+    period, step = scenario.leg_control.period, scenario.plant.time_step
+    if abs(period / step - round(period / step)) > 1e-6 or period < step * (1 - 1e-9):
+        message = f"accepted: a multiple of the plant's step, {step:g}"
+        yield Problem(("controller", "period"), message, period)
+    if scenario.engine != "drake":
+        yield Problem(
+            ("engine",), f"{name} stands on legs, which only Drake simulates; accepted: drake", scenario.engine
+        )
+    if scenario.ground.roll_resistance:
+        message = "of wheels only; accepted: 0 for a robot on legs"
+        yield Problem(("ground", "roll_resistance"), message, scenario.ground.roll_resistance)
 
 
 def load_scenario(

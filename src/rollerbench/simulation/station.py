@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 from pydrake.geometry import Meshcat, SceneGraph
-from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant
+from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Diagram, DiagramBuilder, OutputPort
 from pydrake.systems.primitives import (
     ConstantVectorSource,
@@ -18,11 +18,11 @@ from pydrake.systems.primitives import (
 )
 from pydrake.trajectories import PiecewisePolynomial
 
-from rollerbench.errors import DescriptionError
 from rollerbench.kinematics.profile import Profile
 from rollerbench.plant import RobotModel, ServoGains, add_ground, add_robot, servo_gains
 from rollerbench.simulation.commands import WheelEffortsCommand, WheelSpeedsCommand
-from rollerbench.simulation.drake_config import plant_config
+from rollerbench.simulation.drake_config import add_plant
+from rollerbench.simulation.leg_station import LegStation
 from rollerbench.simulation.scenario import Scenario, load_scenario
 from rollerbench.systems import (
     Drivetrain,
@@ -108,7 +108,7 @@ class Station(Diagram):
         """
         super().__init__()
         builder = DiagramBuilder()
-        plant, scene_graph = _add_plant(builder, scenario)
+        plant, scene_graph = add_plant(builder, scenario)
         model = add_robot(
             plant,
             scenario.simulated_robot,
@@ -166,17 +166,15 @@ def build_station(
     command: Literal["scenario", "external"] = "scenario",
     meshcat: Meshcat | None = None,
     slip: bool = False,
-) -> Station:
-    """The diagram of a scenario, to simulate or to compose with other systems. See `Station`."""
-    return Station(load_scenario(scenario), command=command, meshcat=meshcat, slip=slip)
+) -> Station | LegStation:
+    """The diagram of a scenario, to simulate or to compose with other systems.
 
-
-def _add_plant(builder: DiagramBuilder, scenario: Scenario) -> tuple[MultibodyPlant, SceneGraph]:
-    config = plant_config(scenario)
-    try:
-        return AddMultibodyPlant(config, builder)
-    except (RuntimeError, SystemExit) as error:
-        raise DescriptionError(f"plant: Drake refuses these settings: {error}") from error
+    See `Station`; of a robot on legs `LegStation`, which always exports slip_speeds and normal_forces.
+    """
+    loaded = load_scenario(scenario)
+    if loaded.robot.legs:
+        return LegStation(loaded, command=command, meshcat=meshcat)
+    return Station(loaded, command=command, meshcat=meshcat, slip=slip)
 
 
 def _add_ground(plant: MultibodyPlant, scenario: Scenario, *, drawn: bool) -> None:
@@ -190,12 +188,12 @@ def _add_ground(plant: MultibodyPlant, scenario: Scenario, *, drawn: bool) -> No
 
 def _gains(scenario: Scenario, *, external: bool) -> ServoGains:
     """Gains of the plant's servos: none for wheels that are driven by torques."""
-    gains = servo_gains(scenario.robot, time_constant=scenario.controller.servo_time_constant)
+    gains = servo_gains(scenario.robot, time_constant=scenario.wheel_control.servo_time_constant)
     return replace(gains, drive_damping={}) if _by_torques(scenario, external=external) else gains
 
 
 def _by_torques(scenario: Scenario, *, external: bool) -> bool:
-    return scenario.controller.servo == "pid" or (not external and scenario.motion.wheel_efforts is not None)
+    return scenario.wheel_control.servo == "pid" or (not external and scenario.motion.wheel_efforts is not None)
 
 
 def _add_command(builder: DiagramBuilder, scenario: Scenario, *, external: bool) -> OutputPort:
@@ -229,7 +227,7 @@ def _add_motors(
         efforts = builder.AddNamedSystem("wheel_effort_command", _source(scenario.motion.wheel_efforts))
         effort_port = efforts.get_output_port()
     else:
-        settings = scenario.controller.pid
+        settings = scenario.wheel_control.pid
         gains = None
         if settings is not None:
             gains = [PidGains(kp=settings.kp, ki=settings.ki, kd=settings.kd)] * len(scenario.robot.driven_wheels)

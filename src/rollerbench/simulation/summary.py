@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rollerbench.analysis import error_budget, height_ripple, pose_error, wheel_slip
+from rollerbench.analysis import error_budget, height_ripple, leg_metrics, pose_error, wheel_slip
 from rollerbench.analysis.pose_error import last_direction, path_length, rotation
 from rollerbench.kinematics.odometry import rotate
 from rollerbench.recording import Recording
@@ -42,7 +42,8 @@ def summarize(
         "path_length": path_length(recording),
         "rotation": rotation(recording),
         "reference_final_pose": _pose(recording.reference_q_xyt),
-        **_outcome(recording, half_step),
+        **_outcome(recording, half_step, legs=bool(scenario.robot.legs)),
+        **({"legs": leg_figures(scenario, recording)} if scenario.robot.legs else {}),
         "cross_check": second,
     }
 
@@ -64,17 +65,30 @@ def apart(other: Recording, recording: Recording) -> Array:
     return poses[0] - poses[1]
 
 
-def _outcome(recording: Recording, half_step: Array | None) -> dict[str, Any]:
+def leg_figures(scenario: Scenario, recording: Recording) -> dict[str, Any]:
+    """Key figures of legs, SI units."""
+    return {
+        **dataclasses.asdict(leg_metrics(recording)),
+        "smallest_static_margin": float(scenario.rehearsal.margins.min()),
+    }
+
+
+def _outcome(recording: Recording, half_step: Array | None, *, legs: bool = False) -> dict[str, Any]:
     change = None
     if half_step is not None:
         ahead, left = rotate(-last_direction(recording), half_step[:2])
         x, y, yaw = half_step
         values = {"x": x, "y": y, "yaw": yaw, "along_track": ahead, "cross_track": left}
         change = {name: float(value) for name, value in values.items()}
-    return {
+    poses = {
         "simulated_final_pose": _pose(recording.q_xyt),
         "odometry_final_pose": _pose(recording.odometry_q_xyt),
         "pose_error": dataclasses.asdict(pose_error(recording)),
+    }
+    if legs:
+        return {**poses, "error_budget": {"half_step": change}}
+    return {
+        **poses,
         "wheel_slip": wheel_slip(recording),
         "height_ripple": height_ripple(recording),
         "error_budget": {"parts": error_budget(recording).to_dict(), "half_step": change},

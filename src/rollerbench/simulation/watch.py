@@ -41,20 +41,20 @@ def fault(model: RobotModel, context: Context) -> str | None:
 def _beyond_window(model: RobotModel, R_WB: Array) -> str | None:
     """Whether a wheel leans on rollers that are not simulated."""
     window = model.roller_window
-    tilt = _tilt(R_WB)
-    if window is None or tilt <= min(map(reach, window.windows.values())):
+    angle = tilt(R_WB)
+    if window is None or angle <= min(map(reach, window.windows.values())):
         return None
     return (
-        f"the robot is inclined by {math.degrees(tilt):.0f} deg, and the simulated rollers around the bottoms of its "
+        f"the robot is inclined by {math.degrees(angle):.0f} deg, and the simulated rollers around the bottoms of its "
         "wheels do not reach as far; accepted: a larger plant.roller_window, or plant.roller_model: full"
     )
 
 
 def wrong_pose(robot: Robot, p_WB: Array, R_WB: Array) -> str | None:
     """What is wrong with the pose of a robot's body, position (3,) and rotation (3, 3), on level ground, or None."""
-    tilt = _tilt(R_WB)
-    if tilt > TIP_ANGLE:
-        return f"the robot tipped over: its body is inclined by {math.degrees(tilt):.0f} deg"
+    angle = tilt(R_WB)
+    if angle > TIP_ANGLE:
+        return f"the robot tipped over: its body is inclined by {math.degrees(angle):.0f} deg"
     rise = float(p_WB[2]) + robot.ground_height + static_penetration(robot)
     allowed = HEIGHT_SHARE * min(wheel.radius for wheel in robot.wheels)
     if rise > allowed:
@@ -64,6 +64,6 @@ def wrong_pose(robot: Robot, p_WB: Array, R_WB: Array) -> str | None:
     return None
 
 
-def _tilt(R_WB: Array) -> float:
+def tilt(R_WB: Array) -> float:
     """Angle from B's z axis to the vertical [rad]."""
     return math.acos(min(1.0, max(-1.0, float(R_WB[2, 2]))))

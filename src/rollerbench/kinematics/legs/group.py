@@ -110,6 +110,18 @@ class LegGroup:
         frames: Array = self._X_BL[:, np.newaxis] @ turned_frames(self._links, q + self._offsets)
         return frames
 
+    def leg_frames(self, leg: int, q: Array) -> Array:
+        """Poses (..., n + 1, 4, 4) in B of one leg's joints and foot at many joint angles (..., n)."""
+        own = q.shape[-1]
+        frames: Array = self._X_BL[leg] @ turned_frames(self._links[leg, :own], q + self._offsets[leg, :own])
+        return frames
+
+    def leg_jacobian(self, frames: Array) -> Array:
+        """Geometric Jacobians (..., 6, n) of one leg, rows [w_BF_B; v_BF_B], from its `leg_frames`."""
+        axes, joints = frames[..., :-1, :3, 2], frames[..., :-1, :3, 3]
+        moving = _cross(axes, frames[..., -1:, :3, 3] - joints)
+        return np.concatenate([axes, moving], axis=-1).swapaxes(-1, -2)
+
     def jacobian(self, frames: Array) -> Array:
         """Geometric Jacobians (k, 6, n), rows [w_BF_B; v_BF_B], at the feet's centres."""
         axes, joints = frames[:, :-1, :3, 2] * self.present[..., np.newaxis], frames[:, :-1, :3, 3]
