@@ -195,6 +195,8 @@ class _Reached:
     q: Array
     wheel: Array
     plan: LegPlan
+    pose: Array
+    centers: Array
 
     def __deepcopy__(self, memo: dict[int, Any]) -> "_Reached":
         return self
@@ -230,7 +232,7 @@ class LegTracker(LeafSystem):
         self._start, self._up = start, np.asarray(up_W, dtype=np.float64)
         self._plan = self.DeclareAbstractInputPort("plan", Value(start))
         first = _standing(self._planner, start)
-        index = self.DeclareAbstractState(Value(_Reached(first.q, first.wheel, start)))
+        index = self.DeclareAbstractState(Value(self._reached(first.q, first.wheel, start)))
         self.DeclarePeriodicUnrestrictedUpdateEvent(period, 0.0, self._update)
         sources = {self._plan.ticket(), self.abstract_state_ticket(index)}
         size = len(self._group.to_vector(first.q, first.wheel))
@@ -244,6 +246,10 @@ class LegTracker(LeafSystem):
         start = self._start
         return self._group.to_vector(self._planner.joints(start.posture.name), np.zeros(len(start.load)))
 
+    def _reached(self, q: Array, wheel: Array, plan: LegPlan) -> _Reached:
+        pose = plan.X_PB
+        return _Reached(q, wheel, plan, pose, self._planner.centers_B(plan, pose))
+
     def _calc_tracked(self, context: Context, output: Any) -> None:
         plan: LegPlan = self._plan.Eval(context)
         reached: _Reached = context.get_abstract_state(0).get_value()
@@ -251,14 +257,14 @@ class LegTracker(LeafSystem):
         if plan is before:
             output.set_value(_still(q, wheel))
             return
-        poses = (before.X_PB, plan.X_PB)
-        places = (self._planner.centers_B(before), self._planner.centers_B(plan))
+        following = self._reached(q, wheel, plan)
+        poses, places = (reached.pose, following.pose), (reached.centers, following.centers)
         output.set_value(track(self._group, q, wheel, poses, places, plan.hold, plan.swing < 0, self._period))
 
     def _update(self, context: Context, state: State) -> None:
         tracked: Tracked = self._tracked.Eval(context)
         q, wheel = tracked.next(self._period)
-        state.get_mutable_abstract_state(0).set_value(_Reached(q, wheel, self._plan.Eval(context)))
+        state.get_mutable_abstract_state(0).set_value(self._reached(q, wheel, self._plan.Eval(context)))
 
     def _calc_rates(self, context: Context, output: BasicVector) -> None:
         tracked: Tracked = self._tracked.Eval(context)
@@ -268,7 +274,8 @@ class LegTracker(LeafSystem):
         plan: LegPlan = self._plan.Eval(context)
         tracked: Tracked = self._tracked.Eval(context)
         pose, (q, _) = plan.X_PB, tracked.next(self._period)
-        frames, normal_B, up_B = self._group.frames(q), pose[2, :3], pose[:3, :3].T @ self._up
+        frames = self._group.frames(q) if tracked.frames is None else tracked.frames
+        normal_B, up_B = pose[2, :3], pose[:3, :3].T @ self._up
         ahead = np.array([*plan.twist.rate[:2], 0.0])
         forces = self._group.shared_load(frames, plan.load, GRAVITY * up_B + ahead)
         joints, wheels = self._group.contact_efforts(frames, forces, normal_B)

@@ -17,14 +17,20 @@ from rollerbench.kinematics.legs.group import Hold, LegGroup
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-TWIST_TIME = 0.2
-"""Time constant with which the body's twist follows the command [s]."""
+START_TIME, STOP_TIME = 1.0, 0.5
+"""Times in which the body takes on a new twist on wheels, to more and to less speed [s]."""
 
-OFFSET_TIME = 0.25
-"""Time constant with which the body's offset follows the command [s]."""
+START_SHARE, STOP_SHARE = 1.45, 0.8
+"""The same on foot, over the gait's period, to more and to less speed [-].
 
-GROUND_TIME = 0.3
-"""Time constant with which the body follows the ground's height [s]."""
+With the first, 2 - duty or more, no foot is left behind by more than half a stride before it first lifts.
+"""
+
+OFFSET_TIME = 0.8
+"""Time in which the body takes on a new offset [s]."""
+
+GROUND_TIME = 0.8
+"""Time in which the body takes on a new height of the ground [s]."""
 
 HOME_TOLERANCE = 0.002
 """Feet closer to where their posture has them need no step [m]."""
@@ -104,11 +110,11 @@ class LegPlanner:
             time=0.0,
             q_xyt=np.zeros(3),
             reference=np.zeros(3),
-            twist=Follower(np.zeros(3), np.zeros(3)),
-            offset=Follower(np.zeros(6), np.zeros(6)),
+            twist=Follower.resting(np.zeros(3)),
+            offset=Follower.resting(np.zeros(6)),
             level=np.zeros(3),
             height=self._height[mode.posture],
-            ground=Follower(np.zeros(1), np.zeros(1)),
+            ground=Follower.resting(np.zeros(1)),
             feet_P=feet,
             swing=np.full(count, -1.0),
             lifted_P=feet,
@@ -137,30 +143,32 @@ class LegPlanner:
                 "changes by stepping"
             )
 
-    def centers_B(self, plan: LegPlan) -> Array:
-        """Centres (k, 3) of the feet's wheels in B [m]."""
-        pose = plan.X_PB
+    def centers_B(self, plan: LegPlan, X_PB: Array | None = None) -> Array:
+        """Centres (k, 3) of the feet's wheels in B [m]; the plan's own pose (4, 4) saves computing it again."""
+        pose = plan.X_PB if X_PB is None else X_PB
         centers = plan.feet_P - pose[:3, 3]
         centers[:, 2] += self.group.wheel_radius
         return centers @ pose[:3, :3]
 
     def advance(self, plan: LegPlan, dt: float, command: LegCommand, feedback: LegFeedback) -> LegPlan:
         """The plan a moment dt later [s]."""
-        plan = self._moved(plan, dt, feedback)
+        near = feedback.q + dt * feedback.q_rate
+        feet = np.where((plan.swing < 0)[:, np.newaxis], plan.feet_P + feedback.roll_P, plan.feet_P)
+        plan = replace(plan, feet_P=feet, hold=replace(plan.hold, near=near), level=command.level)
         plan = self._turned_to(plan, command, feedback)
         plan = self._accepting(plan, command, feedback)
-        twist = plan.twist.follow(plan.accepted, dt, TWIST_TIME)
+        twist = plan.twist.follow(plan.accepted, dt, self._twist_time(plan))
         mean = 0.5 * (plan.twist.value + twist.value)
+        moving = bool(mean.any())
         # A robot that stands is not corrected: its feet are where they are.
-        moved = mean + command.correction if mean.any() else mean
-        wanted = command.offset if plan.activity in ("walk", "drive") else 0.0 * command.offset
+        moved = mean + command.correction if moving else mean
+        wanted = command.offset if plan.activity in ("walk", "drive") else np.zeros(6)
         plan = replace(
             plan,
             time=plan.time + dt,
-            q_xyt=odometry.integrate(plan.q_xyt, moved, dt),
-            reference=odometry.integrate(plan.reference, mean, dt),
+            q_xyt=odometry.integrate(plan.q_xyt, moved, dt) if moving else plan.q_xyt,
+            reference=odometry.integrate(plan.reference, mean, dt) if moving else plan.reference,
             twist=twist,
-            level=command.level,
             offset=plan.offset.follow(wanted, dt, OFFSET_TIME),
         )
         match plan.activity:
@@ -174,12 +182,15 @@ class LegPlanner:
                 plan = self._sink(plan, dt)
         on_ground = plan.swing < 0
         ground = plan.feet_P[on_ground, 2].mean(keepdims=True) if on_ground.any() else plan.ground.value
-        return replace(plan, ground=plan.ground.follow(ground, dt, GROUND_TIME))
+        following = plan.ground.follow(ground, dt, GROUND_TIME)
+        return plan if following is plan.ground else replace(plan, ground=following)
 
-    def _moved(self, plan: LegPlan, dt: float, feedback: LegFeedback) -> LegPlan:
-        on_ground = (plan.swing < 0)[:, np.newaxis]
-        feet = np.where(on_ground, plan.feet_P + feedback.roll_P, plan.feet_P)
-        return replace(plan, feet_P=feet, hold=replace(plan.hold, near=feedback.q + dt * feedback.q_rate))
+    def _twist_time(self, plan: LegPlan) -> float:
+        """Time in which the accepted twist is taken on [s]."""
+        faster = np.linalg.norm(plan.accepted) >= np.linalg.norm(plan.twist.value)
+        if plan.activity != "walk":
+            return START_TIME if faster else STOP_TIME
+        return (START_SHARE if faster else STOP_SHARE) * plan.schedule.gait.period
 
     # What to do.
 
@@ -197,14 +208,19 @@ class LegPlanner:
         if plan.activity == "drive":
             if here and mode.motion == "drive" and not (plan.wheeling and plan.wheeling.wound_up):
                 return plan
-            return self._begin_change(plan, mode if not here else replace(mode, change="stepping"), feedback)
+            if not here:
+                return self._begin_change(plan, mode, feedback)
+            # Back into the posture by stepping; to drive on, with the castors behind their axes.
+            back = self._begin_change(plan, replace(mode, change="stepping"), feedback)
+            return self._trailing(back, command.v_xyw_B) if mode.motion == "drive" else back
         if not here and not away and not plan.offset.value.any():
             return self._begin_change(plan, mode, feedback)
         if here and mode.motion == "drive":
             return self._begin_drive(plan, feedback)
         gait = _gait(mode)
         if here and gait != plan.schedule.gait and not away:
-            return replace(plan, schedule=schedule(gait, self.robot))
+            following = schedule(gait, self.robot)
+            return replace(plan, schedule=following, phase=following.duty - LOAD_RAMP)
         return plan
 
     def _accepting(self, plan: LegPlan, command: LegCommand, feedback: LegFeedback) -> LegPlan:
@@ -214,7 +230,7 @@ class LegPlanner:
         if plan.activity == "walk":
             follows &= _gait(mode) == plan.schedule.gait
         if not follows or not request.any():
-            return replace(plan, accepted=np.zeros(3), request=np.zeros(3))
+            return replace(plan, accepted=np.zeros(3), request=np.zeros(3)) if plan.request.any() else plan
         if plan.activity == "drive":
             assert plan.wheeling is not None
             wound_up = plan.wheeling.wound_up or self._wound_up(plan.wheeling, feedback.q)
@@ -247,7 +263,7 @@ class LegPlanner:
             feet = home @ np.array([[cos, sin], [-sin, cos]]) + [x, y]
             centers = np.column_stack([feet, lift + radius - self._height[posture]])
             if offset is not None:
-                still = replace(self.start(LegMode(posture=posture)), offset=Follower(offset, np.zeros(6)))
+                still = replace(self.start(LegMode(posture=posture)), offset=Follower.resting(offset))
                 centers = self.centers_B(replace(still, feet_P=np.column_stack([feet, np.full(len(feet), lift)])))
             if not self.solve(posture, centers)[1]:
                 return False
@@ -355,9 +371,25 @@ class LegPlanner:
         """Whether a joint has turned so far while driving that the legs have to step back into their posture."""
         low, high = self.group.limits
         # A castor swings on while the robot comes to rest.
-        margin = WOUND_UP + np.where(now.castor, 2 * TWIST_TIME * np.abs(now.rate), 0.0)[:, np.newaxis]
+        margin = WOUND_UP + np.where(now.castor, 0.5 * STOP_TIME * np.abs(now.rate), 0.0)[:, np.newaxis]
         near = (q < low + margin) | (q > high - margin)
         return bool((near & (self._turning & self.group.present)).any())
+
+    def _trailing(self, plan: LegPlan, v_xyw_B: Array) -> LegPlan:
+        """A change back into a posture that leaves castors where they trail at a twist (3,)."""
+        change = plan.change
+        assert change is not None
+        frames = self.group.frames(change.q_to)
+        legs, joints = range(len(frames)), frames[range(len(frames)), self._last]
+        start = wheeling.wheeling_from(
+            frames[:, -1, :2, 3], self.group.headings(frames), joints[:, :2, 3], joints[:, 2, 2]
+        )
+        turn = wheeling.trailing_turn(start, v_xyw_B) * np.sign(joints[:, 2, 2])
+        angle = change.q_to[legs, self._last] + turn
+        q_to = change.q_to.copy()
+        q_to[legs, self._last] = np.where(start.castor, np.arctan2(np.sin(angle), np.cos(angle)), angle)
+        change = self._prepared(replace(change, q_to=q_to), plan)
+        return replace(plan, change=change)
 
     # Changing the posture.
 

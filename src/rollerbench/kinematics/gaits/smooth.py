@@ -1,6 +1,5 @@
 """Smooth courses from one value to another."""
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,22 +22,36 @@ def bump(u: float | Array) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Follower:
-    """A vector that follows a target as a critically damped oscillator: no jump in its rate.
+    """A vector that goes to a target in a given time, on a cubic without a jump in its rate.
 
     Attributes:
         value: The vector.
         rate: Its time derivative.
+        target: Where it goes.
+        remaining: Time until it is there [s].
     """
 
     value: Array
     rate: Array
+    target: Array
+    remaining: float = 0.0
 
-    def follow(self, target: Array, dt: float, time_constant: float) -> "Follower":
-        """A moment dt later [s]; the exact solution for a target that stays."""
-        w = 1.0 / time_constant
-        error, decay = self.value - target, math.exp(-w * dt)
-        slope = self.rate + w * error
-        value, rate = target + (error + slope * dt) * decay, (self.rate - w * slope * dt) * decay
-        if np.abs(value - target).max() < 1e-7 and np.abs(rate).max() < 1e-6:
-            return Follower(np.array(target, dtype=np.float64), np.zeros_like(rate))
-        return Follower(value, rate)
+    @classmethod
+    def resting(cls, value: Array) -> "Follower":
+        """A vector that stays where it is."""
+        return cls(value, 0 * value, value)
+
+    def follow(self, target: Array, dt: float, duration: float) -> "Follower":
+        """A moment dt later [s]; a new target is reached in the given duration [s]."""
+        changed = not np.array_equal(target, self.target)
+        left = duration if changed else self.remaining
+        if not changed and left <= 0:
+            return self
+        if left <= dt * (1 + 1e-9):
+            return Follower.resting(np.array(target, dtype=np.float64))
+        # Cubic Hermite polynomial from here to the target at rest.
+        h = dt / left
+        away, slope = self.value - target, left * self.rate
+        value = target + (1 - h) ** 2 * ((1 + 2 * h) * away + h * slope)
+        rate = (1 - h) * (-6 * h * away + (1 - 3 * h) * slope) / left
+        return Follower(value, rate, np.array(target, dtype=np.float64), left - dt)

@@ -14,6 +14,10 @@ MISSED = 1e-3
 """A foot that misses its target by more is out of reach [m]."""
 
 
+CLOSE = 2e-6
+"""Feet this close to their targets need no further iteration [m]."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Tracked:
     """Where the legs are, and how they move until the next period.
@@ -24,6 +28,7 @@ class Tracked:
         q_rate: Mean joint speeds (k, n) until the next period [rad/s].
         wheel_rate: Mean wheel speeds (k,) until then [rad/s].
         roll_P: Displacements (k, 3) by which leaning rolls the feet sideways until then, in P [m].
+        frames: The legs' frames (k, n + 1, 4, 4) after the period (`LegGroup.frames`); None if they stay.
         fault: Why the legs stay where they are, in words; else empty.
     """
 
@@ -32,6 +37,7 @@ class Tracked:
     q_rate: Array
     wheel_rate: Array
     roll_P: Array
+    frames: Array | None = None
     fault: str = ""
 
     def __deepcopy__(self, memo: dict[int, Any]) -> "Tracked":
@@ -68,7 +74,7 @@ def track(
         dt: The period [s].
     """
     still = np.zeros(len(q))
-    target, frames, missed = group.inverse(places[1], hold, tolerance=1e-7)
+    target, frames, missed = group.inverse(places[1], hold, tolerance=CLOSE)
     fault = _fault(group, target, missed)
     if fault:
         return Tracked(q=q, wheel=wheel, q_rate=0 * q, wheel_rate=still, roll_P=np.zeros((len(q), 3)), fault=fault)
@@ -85,7 +91,7 @@ def track(
     velocity = (centers - previous) @ after[:3, :3] / dt
     speed, across = group.rolling(frames, spin, velocity, after[2, :3])
     roll = dt * across @ after[:3, :3].T * stance[:, np.newaxis]
-    return Tracked(q=q, wheel=wheel, q_rate=rate, wheel_rate=np.where(stance, speed, 0.0), roll_P=roll)
+    return Tracked(q=q, wheel=wheel, q_rate=rate, wheel_rate=np.where(stance, speed, 0.0), roll_P=roll, frames=frames)
 
 
 def _fault(group: LegGroup, q: Array, missed: Array) -> str:

@@ -105,6 +105,14 @@ def advanced(wheeling: Wheeling, v_xyw_B: Array, steer_to: Array, dt: float) -> 
     return replace(wheeling, bearing=bearing, contact=contact, heading=wheeling.heading + turned, rate=turned / dt)
 
 
+def trailing_turn(wheeling: Wheeling, v_xyw_B: Array) -> Array:
+    """By how much castors (k,) have to turn to trail behind their axes at a twist (3,); 0 for others [rad]."""
+    velocity = _velocity(wheeling.pivot, v_xyw_B)
+    off = np.arctan2(-velocity[:, 1], -velocity[:, 0]) - wheeling.bearing
+    turns = wheeling.castor & (np.hypot(*velocity.T) > STANDSTILL)
+    return np.where(turns, np.arctan2(np.sin(off), np.cos(off)), 0.0)
+
+
 def _velocity(points: Array, v_xyw_B: Array) -> Array:
     """Velocities (k, 2) of points (k, 2) fixed in B [m/s]."""
     vx, vy, w = v_xyw_B
