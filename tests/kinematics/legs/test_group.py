@@ -78,7 +78,7 @@ def test_vectors_hold_joints_and_wheels_leg_by_leg(make) -> None:
     q, wheel = shaken(group, rng), rng.uniform(-1, 1, len(group.robot.legs))
     vector = group.to_vector(q, wheel)
     expected = [[*own[: len(leg.links)], turn] for leg, own, turn in zip(group.robot.legs, q, wheel, strict=True)]
-    assert vector.tolist() == sum(expected, [])
+    assert vector.tolist() == [value for values in expected for value in values]
     again, turns = group.from_vector(vector)
     assert (again == q).all()
     assert (turns == wheel).all()
