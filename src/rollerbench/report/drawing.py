@@ -26,16 +26,18 @@ class Curve:
     """A line of a figure.
 
     Attributes:
-        label: Its name in the legend.
+        label: Its name in the legend; empty for none.
         x: Abscissae (n,).
         y: Ordinates (n,).
         style: Matplotlib's format, such as "--" or "o".
+        color: Its colour; by default the next one.
     """
 
     label: str
     x: NDArray[np.float64]
     y: NDArray[np.float64]
     style: str = "-"
+    color: str | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -71,7 +73,9 @@ def curves(
     figure, rows = new_figure(len(panels))
     for axes, (ylabel, lines) in zip(rows, panels.items(), strict=True):
         for line, color in zip(lines, cycle(COLORS), strict=False):
-            axes.plot(line.x, line.y, line.style, color=color, label=line.label, markersize=4, linewidth=1.3)
+            axes.plot(
+                line.x, line.y, line.style, color=line.color or color, label=line.label, markersize=4, linewidth=1.3
+            )
         axes.set_ylabel(ylabel)
         if len(lines) > 1:
             axes.legend()
@@ -146,24 +150,22 @@ def space(
         elevation: Of the eye over the x-y plane [deg].
         azimuth: Direction of the eye about z from x [deg].
     """
-    figure = Figure(figsize=(7.0, 5.8), layout="constrained")
-    axes = cast(Axes3D, figure.add_subplot(projection="3d"))
+    figure = Figure(figsize=(7.0, 5.8))
+    axes = cast(Axes3D, figure.add_axes((0.0, 0.13, 1.0, 0.87), projection="3d"))
     for line in lines:
-        axes.plot(
-            *line.points.T, line.style, color=line.color, label=line.label or None, linewidth=line.width, markersize=4
-        )
+        axes.plot(*line.points.T, line.style, color=line.color, label=line.label, linewidth=line.width, markersize=4)
     axes.set_xlabel(labels[0], labelpad=8.0)
     axes.set_ylabel(labels[1], labelpad=8.0)
     axes.set_zlabel(labels[2], labelpad=6.0)
     axes.locator_params(nbins=5)
     axes.view_init(elev=elevation, azim=azimuth)
     points = np.concatenate([line.points for line in lines])
-    middle, extent = 0.5 * (points.max(axis=0) + points.min(axis=0)), 1.1 * np.ptp(points, axis=0)
+    middle, extent = 0.5 * (points.max(axis=0) + points.min(axis=0)), 1.05 * np.ptp(points, axis=0)
     extent = np.maximum(extent, 0.3 * extent.max())
     for name, center, size in zip("xyz", middle, extent, strict=True):
         getattr(axes, f"set_{name}lim")(center - 0.5 * size, center + 0.5 * size)
-    axes.set_box_aspect(tuple(extent), zoom=0.88)
-    axes.legend(loc="upper left")
+    axes.set_box_aspect(tuple(extent), zoom=1.05)
+    figure.legend(loc="lower center", ncols=4)
     return svg_text(figure)
 
 

@@ -99,7 +99,8 @@ def _support(noise: leg_support.Errors) -> tuple[Mistake, ...]:
             where="Section 2.2, position",
             claim="The position of the platform follows from the centre of its circle.",
             correction="It does for exact feet; but on obtuse triangles the centre magnifies errors of the feet, here "
-            "1 mm in each coordinate, 1000 draws. Least squares over the feet do not.",
+            "1 mm in each coordinate, 1000 draws. Least squares keep the middle of the feet; a thin triangle tilts "
+            "either way.",
             proof=proof,
         ),
     )  # fmt: skip

@@ -99,6 +99,11 @@ def _seen(poses: Array, p_GF: Array) -> Array:
     return np.asarray((p_GF - poses[:, np.newaxis, :3, 3]) @ poses[:, :3, :3])
 
 
+def _inverse(poses: Array) -> Array:
+    """Poses X_BG (n, 4, 4) from X_GB."""
+    return np.asarray(np.linalg.inv(poses), dtype=np.float64)
+
+
 def _stretch(feet: Array) -> float:
     """Largest change of the distances between feet (n, 3, 3) [mm]."""
     sides = np.linalg.norm(feet - np.roll(feet, 1, axis=1), axis=2)
@@ -120,7 +125,7 @@ def _angles(found: Array, poses: Array) -> Array:
 
 def _mechanism(poses: Array, q: Array) -> Picture:
     """Figure 7 in the paper's frame: the body is fixed, the ground moves."""
-    robot, ground = song.three_legs(), np.linalg.inv(poses)
+    robot, ground = song.three_legs(), _inverse(poses)
     feet = 1e3 * _seen(poses, ground_feet())
     hips = 1e3 * np.array([leg.hip for leg in robot.legs])
     lines = [SpaceCurve(label="body (fixed)", points=hips[[0, 1, 2, 0]], color="black", width=2.5)]
@@ -132,37 +137,40 @@ def _mechanism(poses: Array, q: Array) -> Picture:
         for index in range(3)
     ]
     lines.append(SpaceCurve(label="origin O'", points=1e3 * ground[:, :3, 3], color=COLORS[3], width=1.8))
-    for count, sample in enumerate((0, SAMPLES // 8, SAMPLES // 3, 5 * SAMPLES // 8)):
+    for count, sample in enumerate((0, SAMPLES // 4, 3 * SAMPLES // 4)):
         triangle = np.take(feet[sample], [0, 1, 2, 0], axis=0)
-        lines.append(SpaceCurve(label="" if count else "ground", points=triangle, color="0.5", style=":", width=0.9))
-        for axis, (name, style) in enumerate((("x'", "-"), ("y'", "--"), ("z'", "-."))):
+        lines.append(SpaceCurve(label="" if count else "ground", points=triangle, color="0.55", style=":", width=0.9))
+        for axis, (name, style) in enumerate((("x'", "-"), ("y'", "--"), ("z'", ":"))):
             origin = 1e3 * ground[sample, :3, 3]
-            arrow = np.stack([origin, origin + 60.0 * ground[sample, :3, axis]])
+            arrow = np.stack([origin, origin + 110.0 * ground[sample, :3, axis]])
             label = "" if count else f"axis {name}"
-            lines.append(SpaceCurve(label=label, points=arrow, color=COLORS[5], style=style, width=1.4))
+            lines.append(SpaceCurve(label=label, points=arrow, color=COLORS[4], style=style, width=1.6))
     return Picture(
         name="figure_07",
         title="Figures 6 and 7.",
         caption="The support mechanism of three legs, seen from the body as in the paper: paths of the feet, which are "
-        "the corners of the moving platform, and of its origin; its triangle and axes at four moments.",
-        svg=space(("x [mm]", "y [mm]", "z [mm]"), lines, elevation=28.0, azimuth=-65.0),
+        "the corners of the moving platform, and of its origin; its triangle and axes at three moments.",
+        svg=space(("x [mm]", "y [mm]", "z [mm]"), lines, elevation=38.0, azimuth=-75.0),
     )
 
 
 def _coordinates(share: Array, poses: Array, found: Array) -> Picture:
     """Pose of the platform in the body over the motion."""
     panels: dict[str, list[Curve]] = {"position of O' [mm]": [], "attitude [deg]": []}
-    for label, style, each in (("prescribed", "-", poses), ("from the joints", "o", found)):
-        ground, kept = np.linalg.inv(each), slice(None, None, 1 if style == "-" else 8)
+    for label, style, color, each in (("prescribed", "-", None, poses), ("from the joints", "o", COLORS[6], found)):
+        ground, kept = _inverse(each), slice(None, None, 1 if color is None else 8)
         places = 1e3 * ground[kept, :3, 3]
         turns = Rotation.from_matrix(ground[kept, :3, :3]).as_euler("xyz", degrees=True)
-        panels["position of O' [mm]"] += [
-            Curve(label=f"{axis}, {label}", x=share[kept], y=places[:, i], style=style) for i, axis in enumerate("xyz")
-        ]
-        panels["attitude [deg]"] += [
-            Curve(label=f"{axis}, {label}", x=share[kept], y=turns[:, i], style=style)
-            for i, axis in enumerate(("roll", "pitch", "yaw"))
-        ]
+        for panel, names, values in (
+            ("position of O' [mm]", ("x", "y", "z"), places),
+            ("attitude [deg]", ("roll", "pitch", "yaw"), turns),
+        ):
+            # The marks of all three are alike: one of them stands in the legend.
+            labels = [f"{name}, {label}" for name in names] if color is None else [label, "", ""]
+            panels[panel] += [
+                Curve(label=labels[index], x=share[kept], y=values[:, index], style=style, color=color)
+                for index in range(3)
+            ]
     return Picture(
         name="figure_07_pose",
         title="Figure 7, pose of the platform.",
@@ -218,10 +226,11 @@ def conditioning(errors: Errors) -> tuple[list[Result], Picture]:
     """How noise of the feet shows in the pose, by the triangle's largest angle."""
     places = ("the middle of the feet", "Bo 150 mm above it")
     results = [
-        Result(item="Section 2.2", quantity=f"{which} error of {place} by {method}, 1 mm of noise, largest angle "
-               f"{angle:g} deg", unit="mm", theory=1e3 * float(reduce(errors[angle][method][:, index])))
-        for angle in (LARGEST_ANGLES[0], LARGEST_ANGLES[-1]) for index, place in enumerate(places) for method in METHODS
-        for which, reduce in (("mean", np.mean), ("largest", np.max))
+        Result(item="Section 2.2", quantity=f"{which} error of {place}, feet with an angle of {angle:g} deg, {method}",
+               unit="mm", theory=1e3 * float(reduce(errors[angle][method][:, index])))
+        for angle in (LARGEST_ANGLES[0], LARGEST_ANGLES[-1])
+        for index, which, reduce in ((0, "mean", np.mean), (0, "largest", np.max), (1, "mean", np.mean))
+        for place in (places[index],) for method in METHODS
     ]  # fmt: skip
     panels = {
         f"error of {place} [mm]": [

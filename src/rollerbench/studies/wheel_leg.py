@@ -49,8 +49,8 @@ def _pose() -> list[Result]:
     pose = LegKinematics(song.leg()).forward(song.ANGLES)
     drake = 1e3 * _foot_in_drake(song.ANGLES[np.newaxis])[0]
     results = [
-        Result(item="Matrix (2.7)", quantity=f"{axis} of the foot (printed: size, the text has no signs here)",
-               unit="mm", printed=float(printed), theory=float(ours), simulated=float(simulated))
+        Result(item="Matrix (2.7)", quantity=f"{axis} of the foot", unit="mm", printed=float(printed),
+               theory=float(ours), simulated=float(simulated))
         for axis, printed, ours, simulated in zip("xyz", song.POSITION, 1e3 * pose[:3, 3], drake, strict=True)
     ]  # fmt: skip
     defect = song.least_defect(song.ROTATION)
@@ -60,13 +60,13 @@ def _pose() -> list[Result]:
     )  # fmt: skip
     sizes = {twist: np.abs(song.rotation_with(twist)) for twist in TWISTS}
     results += [
-        Result(item="Matrix (2.7)", quantity=f"size of entry ({row + 1}, {column + 1}) of the rotation, alpha4 = "
-               f"{twist:g} deg", unit="-", printed=float(song.ROTATION[row, column]),
+        Result(item="Matrix (2.7)", quantity=f"size of R{row + 1}{column + 1}, alpha4 = {twist:g} deg", unit="-",
+               printed=float(song.ROTATION[row, column]),
                theory=float(sizes[twist][row, column]))
         for twist in (song.ALPHA_4, 0.0) for row in range(3) for column in range(3)
     ]  # fmt: skip
     results += [
-        Result(item="Matrix (2.7)", quantity=f"entries of nine whose size fits, alpha4 = {twist:g} deg", unit="-",
+        Result(item="Matrix (2.7)", quantity=f"sizes that fit, of nine, alpha4 = {twist:g} deg", unit="-",
                printed=9.0, theory=float(np.sum(song.entries_that_fit(twist))))
         for twist in TWISTS
     ]  # fmt: skip
