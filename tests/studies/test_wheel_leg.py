@@ -3,6 +3,7 @@
 import json
 import re
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -135,6 +136,23 @@ def test_planned_walks(name: str) -> None:
     # Feet on the ground stay where they are, as long as wheels and legs do not lean sideways.
     both = plan.on_ground[1:] & plan.on_ground[:-1]
     assert np.linalg.norm(np.diff(plan.feet, axis=0), axis=2)[both].max() < 1e-6
+
+
+def test_a_simulated_walk_is_held_against_its_reference() -> None:
+    name, time = "hexapod_mammal_walk", np.linspace(0.0, 5.0, 51)
+    columns = dict.fromkeys(("y", "roll", "pitch", "yaw", "reference_y", "reference_yaw"), np.zeros(51))
+    columns |= {"time": time, "reference_x": 0.15 * time, "x": 0.149 * time, "z": 0.4 + 0.001 * np.sin(time)}
+    columns["pitch"] = np.radians(0.5) * np.sin(time)
+    recording = rb.Recording(columns=columns, wheel_names=())
+    run: Any = SimpleNamespace(recording=recording, scenario=SimpleNamespace(robot=rb.load_robot("wheel_leg_hexapod")))
+    results, pictures = leg_walks.walk_findings(name, run)
+    found = {r.quantity: r for r in results}
+    assert found["way ahead of the simulated walk"].difference == pytest.approx(-0.005)
+    assert found["largest distance of the body from its reference"].simulated == pytest.approx(5.0)
+    assert found["largest roll or pitch"].simulated == pytest.approx(0.5, rel=1e-2)
+    assert found["largest error of the heading"].simulated == 0
+    assert found["range of the body's height"].simulated == pytest.approx(2.0, rel=1e-2)
+    assert [p.name for p in pictures] == ["figure_08b", "figure_08b_body"]
 
 
 def test_wheel_leg(tmp_path: Path) -> None:

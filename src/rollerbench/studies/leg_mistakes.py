@@ -59,8 +59,8 @@ def _agreement() -> tuple[Mistake, ...]:
         Mistake(
             where="Section 2, comparison",
             claim="The model in software agrees completely with the equations.",
-            correction="The printed numbers do not show it: a single matrix is printed, and no rigid model can have "
-            "it. What can be said: the position agrees.",
+            correction="The numbers in the text at hand, which lacks the figures, do not show it: a single matrix is "
+            "printed, and no rigid model can have it. Its position, but for signs, is that of the equations.",
             proof={
                 "what R R' - 1 of a rotation can show by rounding to four digits": (float(rounding), "-"),
                 "what the printed one shows, with the best signs": (song.least_defect(song.ROTATION), "-"),
