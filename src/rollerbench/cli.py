@@ -115,7 +115,10 @@ def run(
 @app.command(epilog="Example: rollerbench reproduce differential_drive -o reproductions")
 def reproduce(
     paper: Annotated[
-        str, typer.Argument(help="six_wheel, differential_drive, mecanum, omni_anisotropy, or all.", show_default=True)
+        str,
+        typer.Argument(
+            help="six_wheel, differential_drive, mecanum, omni_anisotropy, wheel_leg, or all.", show_default=True
+        ),
     ] = "all",
     output: Annotated[
         Path, typer.Option("--output", "-o", help="Folder to write; each paper gets a folder in it.")
