@@ -27,7 +27,7 @@ from rollerbench.sdf.servo import leg_gains
 
 Array = NDArray[np.float64]
 
-PERIOD = 0.01
+PERIOD = 0.02
 """Period of control [s]."""
 
 

@@ -14,7 +14,7 @@ MISSED = 1e-3
 """A foot that misses its target by more is out of reach [m]."""
 
 
-CLOSE = 2e-6
+CLOSE = 1e-5
 """Feet this close to their targets need no further iteration [m]."""
 
 
