@@ -108,8 +108,8 @@ class LegPlanner:
         feet = np.column_stack([self._home[mode.posture], np.zeros(count)])
         return LegPlan(
             time=0.0,
-            q_xyt=np.zeros(3),
-            reference=np.zeros(3),
+            q_xyt=(origin := np.zeros(3)),
+            reference=origin,
             twist=Follower.resting(np.zeros(3)),
             offset=Follower.resting(np.zeros(6)),
             level=np.zeros(3),
@@ -162,12 +162,15 @@ class LegPlanner:
         moving = bool(mean.any())
         # A robot that stands is not corrected: its feet are where they are.
         moved = mean + command.correction if moving else mean
+        q_xyt = odometry.integrate(plan.q_xyt, moved, dt) if moving else plan.q_xyt
+        together = plan.reference is plan.q_xyt and not (moving and command.correction.any())
+        reference = q_xyt if together else odometry.integrate(plan.reference, mean, dt)
         wanted = command.offset if plan.activity in ("walk", "drive") else np.zeros(6)
         plan = replace(
             plan,
             time=plan.time + dt,
-            q_xyt=odometry.integrate(plan.q_xyt, moved, dt) if moving else plan.q_xyt,
-            reference=odometry.integrate(plan.reference, mean, dt) if moving else plan.reference,
+            q_xyt=q_xyt,
+            reference=reference,
             twist=twist,
             offset=plan.offset.follow(wanted, dt, OFFSET_TIME),
         )
