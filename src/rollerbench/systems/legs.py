@@ -44,7 +44,7 @@ class GaitPlanner(LeafSystem):
         tracked: what the legs do, from `LegTracker`; as planned if not connected.
         foot_loads (n_legs): measured loads of the feet [N], with which it feels its way over uneven ground; if not
             connected the ground is level.
-        fault (1): anything but 0 halts the robot; optional.
+        fault (1): the number of a leg that does not follow, from 1, halts the robot; 0 if not connected.
     Output ports:
         plan: the `LegPlan` for the end of the present period.
         foot_positions (3 n_legs): centres of the feet's wheels in B then [m].
@@ -113,8 +113,9 @@ class GaitPlanner(LeafSystem):
         tracked = self._eval(context, "tracked", None) or _planned(self.planner, plan)
         q, _ = tracked.next(self._period)
         fault = tracked.fault
-        if self._eval(context, "fault", np.zeros(1)).any():
-            fault = "a leg does not follow"
+        number = int(self._eval(context, "fault", np.zeros(1))[0])
+        if number:
+            fault = f"leg {self.planner.robot.legs[number - 1].name} does not follow"
         feedback = LegFeedback(
             q=q,
             q_rate=tracked.q_rate,

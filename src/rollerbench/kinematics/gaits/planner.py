@@ -280,7 +280,9 @@ class LegPlanner:
     # Walking.
 
     def _away(self, plan: LegPlan) -> Flags:
-        """Which feet are not where the posture has them."""
+        """Which feet are not where the posture has them; while the body is posed, all may have rolled a little."""
+        if plan.offset.value.any() or plan.offset.remaining > 0:
+            return np.zeros(len(plan.load), dtype=bool)
         place = _placed(plan.q_xyt, self._home[plan.posture.name])
         return np.hypot(*(plan.feet_P[:, :2] - place).T) > HOME_TOLERANCE
 
