@@ -80,7 +80,7 @@ def planned(walk: Walk, robot: Robot) -> PlannedWalk:
     planner = LegPlanner(robot)
     mode = LegMode(posture=walk.posture)
     command = LegCommand(v_xyw_B=np.array([walk.speed, 0.0, 0.0]), offset=np.zeros(6), mode=mode)
-    plan, q, wheel = planner.start(mode), planner.joints(walk.posture), np.zeros(len(robot.legs))
+    plan, q, wheel = planner.start(mode), planner.stances.joints(walk.posture), np.zeros(len(robot.legs))
     rate, roll = np.zeros_like(q), np.zeros((len(q), 3))
     samples = []
     for _ in range(round(DURATION / PERIOD)):

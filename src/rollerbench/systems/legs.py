@@ -160,7 +160,7 @@ class LegInverseKinematics(LeafSystem):
         planner = LegPlanner(load_robot(robot))
         mode = LegMode(posture=posture or planner.robot.standing[0].name)
         planner.require(mode)
-        self._group, self._hold = planner.group, planner.holds(mode.posture)
+        self._group, self._hold = planner.group, planner.stances.holds(mode.posture)
         self._feet = self.DeclareVectorInputPort("foot_positions", 3 * self._group.shape[0])
         q = self._hold.near
         index = self.DeclareDiscreteState(q.ravel())
@@ -245,7 +245,7 @@ class LegTracker(LeafSystem):
     def angles(self) -> Array:
         """Angles (n) at the start, in the order of the ports [rad]."""
         start = self._start
-        return self._group.to_vector(self._planner.joints(start.posture.name), np.zeros(len(start.load)))
+        return self._group.to_vector(self._planner.stances.joints(start.posture.name), np.zeros(len(start.load)))
 
     def _reached(self, q: Array, wheel: Array, plan: LegPlan) -> _Reached:
         pose = plan.X_PB
@@ -414,7 +414,7 @@ def _gains(model: RobotModel) -> tuple[Array, Array, Array]:
 
 
 def _standing(planner: LegPlanner, plan: LegPlan) -> Tracked:
-    return _still(planner.joints(plan.posture.name), np.zeros(len(plan.load)))
+    return _still(planner.stances.joints(plan.posture.name), np.zeros(len(plan.load)))
 
 
 def _still(q: Array, wheel: Array) -> Tracked:

@@ -41,7 +41,7 @@ class StanceOdometry(LeafSystem):
         """Makes the system for a robot that stands as a plan has it."""
         super().__init__()
         self._group, self._period = planner.group, period
-        q = planner.joints(plan.posture.name)
+        q = planner.stances.joints(plan.posture.name)
         start = stance_start(self._group, q, plan.X_PB)
         self._plan = self.DeclareAbstractInputPort("plan", Value(plan))
         size = len(self._group.to_vector(q, np.zeros(len(q))))

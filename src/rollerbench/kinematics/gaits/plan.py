@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rollerbench.description import Posture
 from rollerbench.kinematics.gaits.changes import Change
-from rollerbench.kinematics.gaits.gait import Gait, Schedule
+from rollerbench.kinematics.gaits.gait import Gait, Schedule, gait_of
 from rollerbench.kinematics.gaits.smooth import Follower
 from rollerbench.kinematics.gaits.wheeling import Wheeling
 from rollerbench.kinematics.legs.group import Hold
@@ -165,6 +165,15 @@ class LegPlan:
             pitch + more_pitch,
             yaw + turn,
         )
+
+
+def mode_gait(mode: LegMode) -> Gait:
+    """The gait of a mode.
+
+    Raises:
+        KinematicsError: there is none of this name.
+    """
+    return gait_of(mode.gait) if isinstance(mode.gait, str) else mode.gait
 
 
 def rotation(roll: float, pitch: float, yaw: float) -> Array:
