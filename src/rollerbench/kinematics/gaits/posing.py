@@ -15,6 +15,9 @@ from rollerbench.kinematics.legs.group import Hold
 
 Array = NDArray[np.float64]
 
+FROM_LIMIT = 0.01
+"""Legs in the air keep this distance from the limits of their joints [rad]."""
+
 
 def begin_change(stances: Stances, plan: LegPlan, mode: LegMode, q: Array) -> LegPlan:
     """The plan of a robot that starts to change to a mode's posture, at joint angles q (k, n)."""
@@ -105,7 +108,8 @@ def _rolling(stances: Stances, start: str, end: str) -> list[changes.Stage]:
 def _stepped(stances: Stances, plan: LegPlan, change: changes.Change, dt: float) -> LegPlan:
     legs, u, pose = change.stages[0].legs, change.linear, plan.X_PB
     assert change.steps is not None
-    q = np.clip(change.steps(change.progress), *stances.group.limits)
+    low, high = stances.group.limits
+    q = np.clip(change.steps(change.progress), low + FROM_LIMIT, high - FROM_LIMIT)
     centers = stances.group.frames(q)[:, -1, :3, 3] @ pose[:3, :3].T + pose[:3, 3]
     centers[:, 2] -= stances.group.wheel_radius
     flying = legs[:, np.newaxis]
