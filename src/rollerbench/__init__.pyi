@@ -7,8 +7,12 @@ from .analysis import pose_error as pose_error
 from .description import Body as Body
 from .description import CastorWheel as CastorWheel
 from .description import FixedWheel as FixedWheel
+from .description import FootWheel as FootWheel
+from .description import Leg as Leg
+from .description import Link as Link
 from .description import MecanumWheel as MecanumWheel
 from .description import OmniWheel as OmniWheel
+from .description import Posture as Posture
 from .description import Robot as Robot
 from .description import Rollers as Rollers
 from .description import SteeredWheel as SteeredWheel

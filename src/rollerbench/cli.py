@@ -80,7 +80,7 @@ def run(
 ) -> None:
     """Simulate a scenario, compare it with the equations, and write the run folder."""
     from rollerbench import simulation
-    from rollerbench.report.terminal import budget_table, summary_table
+    from rollerbench.report.terminal import summary_tables
 
     overrides = list(set_ or [])
     overrides += [f"engine={engine}"] if engine is not None else []
@@ -101,12 +101,12 @@ def run(
             result = simulation.run(loaded, output=output, progress=progress, meshcat=meshcat)
     except SimulationError as error:
         if error.result is not None:
-            _print(summary_table(error.result.summary))
-            _print(budget_table(error.result.summary))
+            for table in summary_tables(error.result.summary):
+                _print(table)
             _print(f"Kept until then: {error.result.folder}")
         raise
-    _print(summary_table(result.summary))
-    _print(budget_table(result.summary))
+    for table in summary_tables(result.summary):
+        _print(table)
     _print(f"Written: {result.folder}")
     if live and sys.stdin.isatty():
         input("Press Enter to close the live page. ")
@@ -115,7 +115,10 @@ def run(
 @app.command(epilog="Example: rollerbench reproduce differential_drive -o reproductions")
 def reproduce(
     paper: Annotated[
-        str, typer.Argument(help="six_wheel, differential_drive, mecanum, omni_anisotropy, or all.", show_default=True)
+        str,
+        typer.Argument(
+            help="six_wheel, differential_drive, mecanum, omni_anisotropy, wheel_leg, or all.", show_default=True
+        ),
     ] = "all",
     output: Annotated[
         Path, typer.Option("--output", "-o", help="Folder to write; each paper gets a folder in it.")

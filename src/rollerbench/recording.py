@@ -57,12 +57,32 @@ them.
 """
 
 
+LEG_COLUMNS: dict[str, str] = {
+    **dict.fromkeys(("foot_x", "foot_y", "foot_z"), "m"),
+    **dict.fromkeys(("slip_x", "slip_y"), "m/s"),
+    "wheel": "rad",
+    "wheel_speed": "rad/s",
+    "wheel_effort": "N m",
+    "stance": "-",
+    "load": "N",
+    "joint_": "rad",
+    "effort_": "N m",
+}
+"""Columns of each leg, named leg.column, and their units; joint_ and effort_ are followed by the joint's number.
+
+foot is the lowest point of the foot's wheel and slip its velocity over the ground, in W; stance is the share of its
+load that the foot shall bear, load what it bears. The body's desired height and inclination are in desired_z,
+desired_roll and desired_pitch.
+"""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Recording:
     """Samples of a run, one per step of the plant.
 
     Attributes:
-        columns: Arrays (n,) by name: `ROBOT_COLUMNS`, and `WHEEL_COLUMNS` of each wheel as "wheel.column".
+        columns: Arrays (n,) by name: `ROBOT_COLUMNS`, and `WHEEL_COLUMNS` of each wheel as "wheel.column", or
+            `LEG_COLUMNS` of each leg.
         wheel_names: Names of the wheels in the order of robot.yaml.
         metadata: Names and versions that tell where the recording comes from.
     """
@@ -142,4 +162,6 @@ class Recording:
 
 def _unit(name: str) -> str:
     column = name.rpartition(".")[2]
-    return ROBOT_COLUMNS.get(name) or WHEEL_COLUMNS.get(column) or "rad/s"
+    known = {**ROBOT_COLUMNS, "desired_z": "m", "desired_roll": "rad", "desired_pitch": "rad"}
+    of_parts = WHEEL_COLUMNS | LEG_COLUMNS
+    return known.get(name) or of_parts.get(column) or of_parts.get(column.rstrip("0123456789"), "rad/s")

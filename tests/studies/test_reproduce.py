@@ -234,7 +234,7 @@ def test_the_mass_is_where_gamma_says(gamma_deg: float) -> None:
 
 
 def test_refusals(tmp_path: Path) -> None:
-    assert paper_names() == ["six_wheel", "differential_drive", "mecanum", "omni_anisotropy"]
+    assert paper_names() == ["six_wheel", "differential_drive", "mecanum", "omni_anisotropy", "wheel_leg"]
     with pytest.raises(rb.ResourceError, match=r"no paper 'tricycle'; accepted: six_wheel, differential_drive"):
         reproduce("tricycle", output=tmp_path)
     (tmp_path / "thesis.tex").write_text("precious")

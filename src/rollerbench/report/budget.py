@@ -59,7 +59,9 @@ def _fixed(value: float, digits: int) -> str:
 
 
 def budgets(summary: Mapping[str, Any]) -> dict[str, list[tuple[str, ...]]]:
-    """The rows of all budgets in a summary, by engine: with a cross-check there are two."""
+    """The rows of all budgets in a summary, by engine: with a cross-check there are two, of a robot on legs none."""
+    if "legs" in summary:
+        return {}
     found = [(summary["engine"], summary["error_budget"])]
     if summary["cross_check"] is not None:
         found.append((summary["cross_check"]["engine"], summary["cross_check"]["error_budget"]))

@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from rollerbench import analysis
 from rollerbench.recording import Recording
 from rollerbench.report.drawing import COLORS, STYLES, new_figure, svg_text
+from rollerbench.report.legs_drawn import leg_figures
 
 NOTHING = 1e-3
 """Errors that are smaller are drawn as none [mm, deg]."""
@@ -15,6 +16,8 @@ NOTHING = 1e-3
 
 def run_figures(recording: Recording) -> dict[str, str]:
     """SVG texts of a run's figures by name."""
+    if "legs" in recording.metadata:
+        return {"trajectory": trajectory(recording), "pose_error": pose_error(recording), **leg_figures(recording)}
     return {
         "trajectory": trajectory(recording),
         "pose_error": pose_error(recording),

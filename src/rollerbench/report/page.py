@@ -15,6 +15,10 @@ TITLES = {
     "wheel_speeds": "Wheel speeds",
     "wheel_slip": "Slip of the wheels over the ground",
     "error_budget": "Parts of the pose error",
+    "body": "Height and inclination of the body",
+    "gait": "Which feet are on the ground, and what they bear",
+    "feet": "Feet over the ground",
+    "joint_efforts": "Torques of the joints' motors",
 }
 
 

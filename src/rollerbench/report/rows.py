@@ -21,8 +21,7 @@ def summary_rows(summary: Mapping[str, Any]) -> list[Row]:
         ("  ahead, left", f"{_mm(error['along_track'])}, {_mm(error['cross_track'])}"),
         ("  largest", _mm(error["max_position"])),
         ("Yaw error", f"{_degrees(error['final_yaw'])}, largest {_degrees(error['max_yaw'])}"),
-        ("Wheel slip", f"rms {_mm(summary['wheel_slip']['rms'])}/s, largest {_mm(summary['wheel_slip']['max'])}/s"),
-        ("Height ripple", f"{_mm(summary['height_ripple'])}"),
+        *(_leg_rows(summary["legs"]) if "legs" in summary else _wheel_rows(summary)),
         ("Real-time factor", f"{summary['realtime_factor']:.1f}, {summary['engine']}"),
     ]
     if summary["cross_check"]:
@@ -30,6 +29,24 @@ def summary_rows(summary: Mapping[str, Any]) -> list[Row]:
     if summary["failure"]:
         rows.insert(0, ("Failed", summary["failure"]))
     return rows
+
+
+def _wheel_rows(summary: Mapping[str, Any]) -> list[Row]:
+    slip = summary["wheel_slip"]
+    return [
+        ("Wheel slip", f"rms {_mm(slip['rms'])}/s, largest {_mm(slip['max'])}/s"),
+        ("Height ripple", f"{_mm(summary['height_ripple'])}"),
+    ]
+
+
+def _leg_rows(legs: Mapping[str, Any]) -> list[Row]:
+    return [
+        ("Steps", f"{legs['steps']}"),
+        ("Slip in a stance", f"mean {_mm(legs['mean_slip'])}, largest {_mm(legs['largest_slip'])}"),
+        ("Height, tilt error", f"largest {_mm(legs['height_error'])}, {_degrees(legs['tilt_error'])}"),
+        ("Stability margin", f"{_mm(legs['smallest_static_margin'])} at least, as planned"),
+        ("Joint torque", f"{legs['largest_effort']:.1f} N m at most"),
+    ]
 
 
 def _cross_check_rows(second: Mapping[str, Any]) -> list[Row]:

@@ -10,6 +10,12 @@ from rollerbench.report.budget import COLUMNS, budgets
 from rollerbench.report.rows import summary_rows
 
 
+def summary_tables(summary: Mapping[str, Any]) -> list[Table]:
+    """The key figures of a run, and where its pose error comes from, if that is known."""
+    tables = [summary_table(summary)]
+    return [*tables, budget_table(summary)] if budgets(summary) else tables
+
+
 def summary_table(summary: Mapping[str, Any]) -> Table:
     """The key figures of a run."""
     table = Table(title=summary["scenario"], show_header=False, title_justify="left", title_style="bold")

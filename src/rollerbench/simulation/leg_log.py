@@ -36,9 +36,10 @@ def leg_recording(station: LegStation, scenario: Scenario, context: Context) -> 
     rpy, p_WB = rotation.as_euler("xyz"), state[:, q + 4 : q + 7]
     w_WB, v_WB = state[:, v : v + 3], state[:, v + 3 : v + 6]
     yaw = np.unwrap(rpy[:, 2])
-    reference, twist = resampled(data["reference_q_xyt"]), resampled(data["reference_v_xyw_B"])
+    twist = resampled(data["reference_v_xyw_B"])
     joints = state @ model.leg_state_matrix().T
     stance, desired = resampled(data["stance"]), resampled(data["desired"])
+    reference = desired[:, [0, 1, 5]]
     planar = np.column_stack([rotate(-yaw, v_WB[:, :2]), w_WB[:, 2]])
     if "odometry_q_xyt" in data:
         odometry = data["odometry_q_xyt"].copy()

@@ -60,7 +60,7 @@ def rehearse(
     """
     planner = LegPlanner(robot)
     plan = planner.start(course[0][1].mode)
-    q, wheel = planner.joints(plan.posture.name), np.zeros(len(plan.load))
+    q, wheel = planner.stances.joints(plan.posture.name), np.zeros(len(plan.load))
     feedback = LegFeedback(q=q, q_rate=0 * q, roll_P=np.zeros((len(q), 3)))
     plans, margins = [plan], [_margin(planner, plan, q, gravity)]
     for _ in range(round(duration / period)):

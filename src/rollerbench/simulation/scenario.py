@@ -74,7 +74,7 @@ class LegControl(Part):
 
     type: Literal["legs"] = "legs"
     closed_loop: Flag = False
-    period: Annotated[Positive, Field(ge=1e-4, le=0.1)] = 0.01
+    period: Annotated[Positive, Field(ge=1e-4, le=0.1)] = 0.02
 
 
 UNFIT = {

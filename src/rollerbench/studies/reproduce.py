@@ -10,12 +10,13 @@ from rollerbench.errors import ResourceError
 from rollerbench.report.reproduction import reproduction_page
 from rollerbench.simulation import RunResult, run
 from rollerbench.simulation.log import versions
-from rollerbench.studies import differential_drive, mecanum, omni_anisotropy, six_wheel
+from rollerbench.studies import differential_drive, mecanum, omni_anisotropy, six_wheel, wheel_leg
 from rollerbench.studies.folder import claim, write_figures
 from rollerbench.studies.paper import Findings, Paper
 
 PAPERS = {
-    paper.name: paper for paper in (six_wheel.PAPER, differential_drive.PAPER, mecanum.PAPER, omni_anisotropy.PAPER)
+    paper.name: paper
+    for paper in (six_wheel.PAPER, differential_drive.PAPER, mecanum.PAPER, omni_anisotropy.PAPER, wheel_leg.PAPER)
 }
 
 FILES, FOLDERS = {"results.json", "report.html"}, {"figures", "runs"}

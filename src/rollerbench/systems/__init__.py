@@ -3,17 +3,28 @@
 from rollerbench.systems.contacts import RollResistance, SlipMonitor
 from rollerbench.systems.drivetrain import Drivetrain
 from rollerbench.systems.kinematics import ForwardKinematics, InverseKinematics, Odometry, PlanarState
+from rollerbench.systems.legs import GaitPlanner, LegInverseKinematics, LegServo, LegTracker, damp_joints, unlimited
+from rollerbench.systems.stance import BodyPoseController, LegWatch, StanceOdometry
 from rollerbench.systems.wheel_speed_controller import PidGains, WheelSpeedController, wheel_speed_gains
 
 __all__ = [
+    "BodyPoseController",
     "Drivetrain",
     "ForwardKinematics",
+    "GaitPlanner",
     "InverseKinematics",
+    "LegInverseKinematics",
+    "LegServo",
+    "LegTracker",
+    "LegWatch",
     "Odometry",
     "PidGains",
     "PlanarState",
     "RollResistance",
     "SlipMonitor",
+    "StanceOdometry",
     "WheelSpeedController",
+    "damp_joints",
+    "unlimited",
     "wheel_speed_gains",
 ]

@@ -27,7 +27,7 @@ from rollerbench.sdf.servo import leg_gains
 
 Array = NDArray[np.float64]
 
-PERIOD = 0.01
+PERIOD = 0.02
 """Period of control [s]."""
 
 
@@ -44,7 +44,7 @@ class GaitPlanner(LeafSystem):
         tracked: what the legs do, from `LegTracker`; as planned if not connected.
         foot_loads (n_legs): measured loads of the feet [N], with which it feels its way over uneven ground; if not
             connected the ground is level.
-        fault (1): anything but 0 halts the robot; optional.
+        fault (1): the number of a leg that does not follow, from 1, halts the robot; 0 if not connected.
     Output ports:
         plan: the `LegPlan` for the end of the present period.
         foot_positions (3 n_legs): centres of the feet's wheels in B then [m].
@@ -113,8 +113,9 @@ class GaitPlanner(LeafSystem):
         tracked = self._eval(context, "tracked", None) or _planned(self.planner, plan)
         q, _ = tracked.next(self._period)
         fault = tracked.fault
-        if self._eval(context, "fault", np.zeros(1)).any():
-            fault = "a leg does not follow"
+        number = int(self._eval(context, "fault", np.zeros(1))[0])
+        if number:
+            fault = f"leg {self.planner.robot.legs[number - 1].name} does not follow"
         feedback = LegFeedback(
             q=q,
             q_rate=tracked.q_rate,
@@ -159,7 +160,7 @@ class LegInverseKinematics(LeafSystem):
         planner = LegPlanner(load_robot(robot))
         mode = LegMode(posture=posture or planner.robot.standing[0].name)
         planner.require(mode)
-        self._group, self._hold = planner.group, planner.holds(mode.posture)
+        self._group, self._hold = planner.group, planner.stances.holds(mode.posture)
         self._feet = self.DeclareVectorInputPort("foot_positions", 3 * self._group.shape[0])
         q = self._hold.near
         index = self.DeclareDiscreteState(q.ravel())
@@ -244,7 +245,7 @@ class LegTracker(LeafSystem):
     def angles(self) -> Array:
         """Angles (n) at the start, in the order of the ports [rad]."""
         start = self._start
-        return self._group.to_vector(self._planner.joints(start.posture.name), np.zeros(len(start.load)))
+        return self._group.to_vector(self._planner.stances.joints(start.posture.name), np.zeros(len(start.load)))
 
     def _reached(self, q: Array, wheel: Array, plan: LegPlan) -> _Reached:
         pose = plan.X_PB
@@ -413,7 +414,7 @@ def _gains(model: RobotModel) -> tuple[Array, Array, Array]:
 
 
 def _standing(planner: LegPlanner, plan: LegPlan) -> Tracked:
-    return _still(planner.joints(plan.posture.name), np.zeros(len(plan.load)))
+    return _still(planner.stances.joints(plan.posture.name), np.zeros(len(plan.load)))
 
 
 def _still(q: Array, wheel: Array) -> Tracked:

@@ -41,7 +41,7 @@ class StanceOdometry(LeafSystem):
         """Makes the system for a robot that stands as a plan has it."""
         super().__init__()
         self._group, self._period = planner.group, period
-        q = planner.joints(plan.posture.name)
+        q = planner.stances.joints(plan.posture.name)
         start = stance_start(self._group, q, plan.X_PB)
         self._plan = self.DeclareAbstractInputPort("plan", Value(plan))
         size = len(self._group.to_vector(q, np.zeros(len(q))))
@@ -130,7 +130,7 @@ class LegWatch(LeafSystem):
     Input ports:
         lag (n): desired minus true angles, from `LegServo` [rad].
     Output ports:
-        fault (1): 1 if a joint lags too far behind, else 0.
+        fault (1): 0, or the number of the leg of which a joint lags too far behind, from 1.
     """
 
     def __init__(self, planner: LegPlanner) -> None:
@@ -139,13 +139,21 @@ class LegWatch(LeafSystem):
         group = planner.group
         # Wheels may slip.
         joints = group.to_vector(np.ones(group.shape), np.zeros(group.shape[0]))
+        numbers = group.to_vector(*_numbers(group.shape))
         self._lag = self.DeclareVectorInputPort("lag", len(joints))
 
         def calc(context: Context, output: BasicVector) -> None:
             lag = np.abs(np.asarray(self._lag.Eval(context))) * joints
-            output.SetFromVector([float(lag.max() > LEG_LAG)])
+            worst = int(np.argmax(lag))
+            output.SetFromVector([numbers[worst] if lag[worst] > LEG_LAG else 0.0])
 
         self.DeclareVectorOutputPort("fault", 1, calc, {self._lag.ticket()})
+
+
+def _numbers(shape: tuple[int, int]) -> tuple[Array, Array]:
+    """For each joint and wheel the number of its leg."""
+    numbers = np.arange(1.0, shape[0] + 1.0)
+    return np.repeat(numbers[:, np.newaxis], shape[1], axis=1), numbers
 
 
 def _pose_vector(X_WB: Array) -> Array:

@@ -38,9 +38,6 @@ STRAIGHT = 0.65
 NEAR = 0.3
 """Share of this straight way after which its direction no longer follows from the leg's [-]."""
 
-UNDER_HIP = 0.02
-"""Feet this close to the axis of their hip stand under it [m]."""
-
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Course:

@@ -1,5 +1,6 @@
 """What a robot's legs are about to do, for one moment; and what the plan is made from."""
 
+import math
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -8,7 +9,7 @@ from numpy.typing import NDArray
 
 from rollerbench.description import Posture
 from rollerbench.kinematics.gaits.changes import Change
-from rollerbench.kinematics.gaits.gait import Gait, Schedule
+from rollerbench.kinematics.gaits.gait import Gait, Schedule, gait_of
 from rollerbench.kinematics.gaits.smooth import Follower
 from rollerbench.kinematics.gaits.wheeling import Wheeling
 from rollerbench.kinematics.legs.group import Hold
@@ -139,29 +140,46 @@ class LegPlan:
     @property
     def X_PB(self) -> Array:
         """Pose (4, 4) of the body in P."""
-        x, y, yaw = self.q_xyt
-        dx, dy, dz, roll, pitch, turn = self.offset.value
-        dz, roll, pitch = np.array([dz, roll, pitch]) + self.level
-        cos, sin = np.cos(yaw), np.sin(yaw)
+        x, y, z, roll, pitch, yaw = self._pose(self.q_xyt, self.level)
         pose = np.eye(4)
-        pose[:3, :3] = rotation(roll, pitch, yaw + turn)
-        pose[:3, 3] = (x + cos * dx - sin * dy, y + sin * dx + cos * dy, self.height + dz + self.ground.value[0])
+        pose[:3, :3] = rotation(roll, pitch, yaw)
+        pose[:3, 3] = x, y, z
         return pose
 
     @property
     def desired(self) -> Array:
         """Where the body shall be (6,): x, y, z [m], roll, pitch, yaw [rad], on its reference."""
-        x, y, yaw = self.reference
-        dx, dy, dz, roll, pitch, turn = self.offset.value
-        cos, sin = np.cos(yaw), np.sin(yaw)
-        height = self.height + dz + self.ground.value[0]
-        return np.array([x + cos * dx - sin * dy, y + sin * dx + cos * dy, height, roll, pitch, yaw + turn])
+        return np.array(self._pose(self.reference, np.zeros(3)))
+
+    def _pose(self, q_xyt: Array, level: Array) -> tuple[float, float, float, float, float, float]:
+        # Plain numbers: numpy's functions take ten times as long on single ones.
+        (x, y, yaw), (dx, dy, dz, roll, pitch, turn) = q_xyt.tolist(), self.offset.value.tolist()
+        cos, sin = math.cos(yaw), math.sin(yaw)
+        up, more_roll, more_pitch = level.tolist()
+        height = self.height + float(self.ground.value[0]) + dz + up
+        return (
+            x + cos * dx - sin * dy,
+            y + sin * dx + cos * dy,
+            height,
+            roll + more_roll,
+            pitch + more_pitch,
+            yaw + turn,
+        )
+
+
+def mode_gait(mode: LegMode) -> Gait:
+    """The gait of a mode.
+
+    Raises:
+        KinematicsError: there is none of this name.
+    """
+    return gait_of(mode.gait) if isinstance(mode.gait, str) else mode.gait
 
 
 def rotation(roll: float, pitch: float, yaw: float) -> Array:
     """Rotation (3, 3) by yaw about z after pitch about y after roll about x [rad]."""
-    cr, sr, cp, sp = np.cos(roll), np.sin(roll), np.cos(pitch), np.sin(pitch)
-    cy, sy = np.cos(yaw), np.sin(yaw)
+    cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
+    cy, sy = math.cos(yaw), math.sin(yaw)
     return np.array(
         [
             [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],

@@ -14,7 +14,10 @@ MISSED = 1e-3
 """A foot that misses its target by more is out of reach [m]."""
 
 
-CLOSE = 2e-6
+BEYOND = 1e-3
+"""A joint beyond its limit by more would be damaged [rad]."""
+
+CLOSE = 1e-5
 """Feet this close to their targets need no further iteration [m]."""
 
 
@@ -100,7 +103,7 @@ def _fault(group: LegGroup, q: Array, missed: Array) -> str:
         worst = int(np.argmax(np.nan_to_num(missed, nan=np.inf)))
         return f"the foot of leg {legs[worst].name} misses its place by {1e3 * missed[worst]:.3g} mm"
     excess = group.beyond_limits(q)
-    if excess.any():
+    if excess.max() > BEYOND:
         leg, joint = np.unravel_index(int(np.argmax(excess)), excess.shape)
         link = legs[leg].links[joint]
         return (

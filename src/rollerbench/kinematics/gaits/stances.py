@@ -1,0 +1,116 @@
+"""The postures of a robot as numbers: joints, feet, heights; and how far the legs reach from them."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollerbench.description import Robot
+from rollerbench.kinematics import odometry
+from rollerbench.kinematics.gaits.gait import Schedule
+from rollerbench.kinematics.gaits.plan import rotation
+from rollerbench.kinematics.gaits.plane import placed
+from rollerbench.kinematics.legs.group import Hold, LegGroup
+
+Array = NDArray[np.float64]
+
+REACH_TOLERANCE = 1e-4
+"""Feet this close to their targets count as there [m]."""
+
+UNDER_HIP = 0.02
+"""Feet this close to the axis of their hip stand under it [m]."""
+
+
+class Stances:
+    """What the legs of a robot do in each of its postures.
+
+    Attributes:
+        robot: The robot.
+        group: Its legs.
+        postures: Its postures by name.
+        last: Index of the last joint of each leg.
+    """
+
+    def __init__(self, robot: Robot) -> None:
+        self.robot, self.group = robot, LegGroup(robot)
+        self.postures = {posture.name: posture for posture in robot.standing}
+        self.last = [len(leg.links) - 1 for leg in robot.legs]
+        self._q = {name: self.group.posture(name) for name in self.postures}
+        self._holds = {name: self.group.hold(posture, self._q[name]) for name, posture in self.postures.items()}
+        centers = {name: robot.feet_B(name) for name in self.postures}
+        self._home = {name: feet[:, :2] for name, feet in centers.items()}
+        self._heading = {name: self.group.headings(self.group.frames(q)) for name, q in self._q.items()}
+        radius = self.group.wheel_radius
+        self._height = {name: float(np.mean(radius - feet[:, 2])) for name, feet in centers.items()}
+
+    def home(self, posture: str) -> Array:
+        """Where the feet of a posture stand (k, 2), in B [m]."""
+        return self._home[posture]
+
+    def height(self, posture: str) -> float:
+        """Height of Bo over the ground in a posture [m]."""
+        return self._height[posture]
+
+    def joints(self, posture: str) -> Array:
+        """Joint angles (k, n) of a posture [rad]."""
+        return self._q[posture]
+
+    def holds(self, posture: str) -> Hold:
+        """What a posture holds."""
+        return self._holds[posture]
+
+    def heading(self, posture: str) -> Array:
+        """Directions (k,) in which the wheels of a posture roll ahead, in B [rad]."""
+        return self._heading[posture]
+
+    def under_hips(self, posture: str) -> bool:
+        """Whether all feet of a posture stand under their hips."""
+        away = self._home[posture] - self.hips
+        return bool((np.hypot(*away.T) < UNDER_HIP).all())
+
+    @property
+    def hips(self) -> Array:
+        """Where the axes of the hips are (k, 2), in B [m]."""
+        return np.array([leg.hip[:2] for leg in self.robot.legs])
+
+    def lowered(self, posture: str, height: float) -> Array:
+        """Joint angles (k, n) of a posture with the body at another height [m], reached on the way there."""
+        q, radius = self._q[posture], self.group.wheel_radius
+        for h in np.linspace(self._height[posture], height, 25)[1:]:
+            centers = np.column_stack([self._home[posture], radius - h])
+            q, _, _ = self.group.inverse(centers, replace(self._holds[posture], near=q), iterations=8)
+        return q
+
+    def solve(self, posture: str, centers_B: Array) -> tuple[Array, bool]:
+        """Joint angles (k, n) of a posture with the feet's centres elsewhere (k, 3), and whether the legs reach."""
+        q, _, missed = self.group.inverse(centers_B, self._holds[posture], iterations=25)
+        return q, bool(missed.max() < REACH_TOLERANCE and not self.group.beyond_limits(q).any())
+
+    def reachable_share(self, posture: str, gait: Schedule, v_xyw_B: Array, offset: Array) -> float:
+        """The largest share, up to 1, of a twist (3,) at which all feet reach where a gait puts them.
+
+        Args:
+            posture: Name of the posture.
+            gait: The gait.
+            v_xyw_B: The twist [m/s, m/s, rad/s].
+            offset: Offset (6,) of the body from where the posture has it: x, y, z [m], roll, pitch, yaw [rad].
+        """
+        if self._reaches(posture, gait, v_xyw_B, offset):
+            return 1.0
+        low, high = 0.0, 1.0
+        for _ in range(7):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if self._reaches(posture, gait, middle * v_xyw_B, offset) else (low, middle)
+        return low
+
+    def _reaches(self, posture: str, gait: Schedule, v_xyw_B: Array, offset: Array) -> bool:
+        """Whether feet reach both ends of their strides, and lift in the middle."""
+        half, lift = 0.5 * gait.duty * gait.gait.period, gait.gait.lift
+        turned = rotation(*offset[3:])
+        place = np.array([offset[0], offset[1], self._height[posture] + offset[2]])
+        for time, height in ((-half, 0.0), (-0.5 * half, 0.0), (0.0, lift), (0.5 * half, 0.0), (half, 0.0)):
+            feet = placed(odometry.integrate(np.zeros(3), -v_xyw_B, time), self._home[posture])
+            centers = np.column_stack([feet, height + self.group.wheel_radius])
+            if not self.solve(posture, (centers - place) @ turned)[1]:
+                return False
+        return True
