@@ -1,7 +1,7 @@
 """Robots on ideal legs: a planner and what follows its plans, without Drake."""
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,7 +11,7 @@ from rollerbench.kinematics.legs import static_margin
 
 Array = NDArray[np.float64]
 
-DT = 0.01
+DT = 0.02
 
 
 @dataclass
@@ -32,16 +32,20 @@ class Walk:
     wheel: list[Array]
     tracked: list[Tracked] = field(default_factory=list)
 
+    def fail(self, fault: str) -> "Walk":
+        """Lets the next plan know that something went wrong."""
+        self.tracked[-1] = replace(self.tracked[-1], fault=fault)
+        return self
+
     def go(self, duration: float, command: LegCommand | Callable[[float], LegCommand], dt: float = DT) -> "Walk":
         """Goes on for a while [s], with one command or one that depends on the time."""
         group, plan, q, wheel = self.planner.group, self.plans[-1], self.q[-1], self.wheel[-1]
-        still = 0 * q if not self.tracked else self.tracked[-1].q_rate
         done = self.tracked[-1] if self.tracked else None
         for _ in range(round(duration / dt)):
             asked = command(plan.time) if callable(command) else command
             feedback = LegFeedback(
                 q=q,
-                q_rate=still if done is None else done.q_rate,
+                q_rate=0 * q if done is None else done.q_rate,
                 roll_P=np.zeros((len(q), 3)) if done is None else done.roll_P,
                 fault="" if done is None else done.fault,
             )
@@ -108,7 +112,7 @@ def margin(planner: LegPlanner, plan: LegPlan, q: Array) -> float:
 def standing(planner: LegPlanner, mode: LegMode | None = None) -> Walk:
     """A robot that stands in a mode's posture."""
     plan = planner.start(mode)
-    q = planner.joints(plan.posture.name)
+    q = planner.stances.joints(plan.posture.name)
     return Walk(planner=planner, plans=[plan], q=[q], wheel=[np.zeros(len(q))])
 
 

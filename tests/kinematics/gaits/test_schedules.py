@@ -1,5 +1,7 @@
 """When legs lift, for robots of four, six and eight legs."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -42,7 +44,7 @@ def test_the_wave_runs_ahead_along_each_side(make) -> None:
         )
         lands = {i: int(np.flatnonzero(flying[:, i] & ~np.roll(flying[:, i], -1))[0]) for i in legs}
         lifts = {i: int(np.flatnonzero(flying[:, i] & ~np.roll(flying[:, i], 1))[0]) for i in legs}
-        for behind, ahead in zip(legs, legs[1:], strict=False):
+        for behind, ahead in pairwise(legs):
             assert lifts[ahead] == (lands[behind] + 1) % len(flying)
 
 

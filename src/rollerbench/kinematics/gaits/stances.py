@@ -21,6 +21,9 @@ REACH_TOLERANCE = 1e-4
 SWING_CHECKS = (0.1, 0.3, 0.5, 0.7, 0.9)
 """Parts of a swing at which it is checked whether feet reach it [-]."""
 
+RESERVE = 1.2
+"""How much faster than asked steady walking must be within reach, as starts and stops leave feet farther behind [-]."""
+
 UNDER_HIP = 0.02
 """Feet this close to the axis of their hip stand under it [m]."""
 
@@ -115,7 +118,7 @@ class Stances:
 
         def after(time: float) -> Array:
             """Where feet (k, 2) on the ground are this long after they were home [s]."""
-            return placed(odometry.integrate(np.zeros(3), -v_xyw_B, time), self._home[posture])
+            return placed(odometry.integrate(np.zeros(3), -RESERVE * v_xyw_B, time), self._home[posture])
 
         strides = [(after(part * half), 0.0) for part in (-1.0, -0.5, 0.5, 1.0)]
         for u in SWING_CHECKS:
