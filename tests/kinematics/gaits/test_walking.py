@@ -43,7 +43,7 @@ def test_standing_feet_do_not_move(gait: str, v_xyw_B: list[float]) -> None:
     walk = standing(HEXAPOD, mode).go(3.0, asked(v_xyw_B, mode)).go(2.5, asked([0, 0, 0], mode))
     assert not walk.faults
     assert_allclose(np.diff(walk.feet, axis=0)[on_the_ground(walk)], 0.0, atol=1e-11)
-    assert walk.misses.max() < 1e-5  # two iterations in a period
+    assert walk.misses.max() < 2e-5  # what the inverse leaves in a period
     assert walk.feet[..., 2].min() >= 0.0
     assert walk.margins.min() > 0.05
     # Feet come home after the stop.
@@ -72,8 +72,8 @@ def test_the_reference_is_the_integral_of_the_accepted_twist() -> None:
         return [np.cos(yaw) * v[0] - np.sin(yaw) * v[1], np.sin(yaw) * v[0] + np.cos(yaw) * v[1], v[2]]
 
     exact = solve_ivp(motion, (0, 6.0), np.zeros(3), t_eval=[6.0], rtol=1e-10, atol=1e-12, max_step=0.02).y[:, -1]
-    # 1e-5: the mean twist of 600 periods of 10 ms.
-    assert_allclose(walk.plans[-1].reference, exact, atol=1e-5)
+    # 1e-4: the mean twist of each of 300 periods of 20 ms.
+    assert_allclose(walk.plans[-1].reference, exact, atol=1e-4)
     assert_allclose(walk.plans[-1].q_xyt, walk.plans[-1].reference, atol=1e-12)
 
 
@@ -108,6 +108,7 @@ def test_the_twist_takes_a_time_to_change() -> None:
 def test_a_twist_beyond_reach_is_followed_as_far_as_the_legs_reach(v_xyw_B: list[float], posture: str) -> None:
     mode = LegMode(posture=posture)
     walk = standing(HEXAPOD, mode).go(4.0, asked(v_xyw_B, mode))
+    assert not any(done.fault for done in walk.tracked)
     (status,) = walk.faults
     assert "the command is beyond the legs' reach; followed at" in status
     last = walk.plans[-1]
@@ -118,9 +119,9 @@ def test_a_twist_beyond_reach_is_followed_as_far_as_the_legs_reach(v_xyw_B: list
     assert_allclose(last.twist.value, last.accepted, atol=1e-12)
     plan = schedule(gait_of("tripod"), HEXAPOD.robot)
     # It is the largest share, but for seven bisections.
-    assert HEXAPOD.reachable_share(posture, plan, 0.999 * last.accepted) == 1.0
-    assert HEXAPOD.reachable_share(posture, plan, last.accepted + 0.01 * np.array(v_xyw_B)) < 1.0
-    assert walk.misses.max() < 1e-5
+    assert HEXAPOD.stances.reachable_share(posture, plan, last.accepted, np.zeros(6)) == 1.0
+    assert HEXAPOD.stances.reachable_share(posture, plan, last.accepted + 0.01 * np.array(v_xyw_B), np.zeros(6)) < 1.0
+    assert walk.misses.max() < 2e-5
 
 
 def test_body_offsets_are_reached_over_feet_that_stand() -> None:
@@ -132,10 +133,10 @@ def test_body_offsets_are_reached_over_feet_that_stand() -> None:
         frames = HEXAPOD.group.frames(walk.q[-1])
         pose = last.X_PB
         feet = frames[:, -1, :3, 3] @ pose[:3, :3].T + pose[:3, 3] - [0, 0, 0.06]
-        # 1e-5: two iterations of the inverse in a period. As legs lean with the body, balls roll sideways.
-        assert_allclose(feet, last.feet_P, atol=1e-5)
-        assert_allclose(feet[:, 2], 0.0, atol=1e-5)
-        assert np.hypot(*(feet - walk.plans[0].feet_P)[:, :2].T).max() <= 0.06 * np.abs(offset[3:]).sum() + 1e-5
+        # 2e-5: what the inverse leaves in a period. As legs lean with the body, balls roll sideways.
+        assert_allclose(feet, last.feet_P, atol=2e-5)
+        assert_allclose(feet[:, 2], 0.0, atol=2e-5)
+        assert np.hypot(*(feet - walk.plans[0].feet_P)[:, :2].T).max() <= 0.06 * np.abs(offset[3:]).sum() + 2e-5
 
 
 def test_a_robot_walks_with_an_offset() -> None:
@@ -144,7 +145,7 @@ def test_a_robot_walks_with_an_offset() -> None:
     walk.go(4.0, asked([0.1, 0.0, 0.1], INSECT, offset))
     assert not walk.faults
     assert_allclose(walk.plans[-1].offset.value, offset, atol=1e-12)
-    assert walk.misses.max() < 1e-5
+    assert walk.misses.max() < 2e-5
 
 
 def test_legs_of_three_joints_walk_as_well() -> None:
@@ -153,7 +154,7 @@ def test_legs_of_three_joints_walk_as_well() -> None:
         mode = LegMode(posture=planner.robot.standing[0].name, gait="wave")
         walk = standing(planner, mode).go(4.0, asked([0.02, 0.01, 0.05], mode)).go(2.5, asked([0, 0, 0], mode))
         assert not walk.faults
-        assert walk.misses.max() < 1e-5
+        assert walk.misses.max() < 2e-5
         assert walk.plans[-1].at_rest
 
 
