@@ -81,9 +81,10 @@ def _odometry(scenario: Scenario, joints: Array, stance: Array, desired: Array, 
     pose[2, 3] = desired[2]
     estimate = stance_start(group, group.from_vector(angles[0])[0], pose)
     poses = [pose]
+    ground = None if scenario.ground.steps else np.zeros(len(scenario.robot.legs))
     for row in chosen[1:]:
         (q, _), (q_rate, wheel) = group.from_vector(angles[row]), group.from_vector(rates[row])
-        estimate = stance_next(group, estimate, (q, q_rate), wheel, stance[row], period)
+        estimate = stance_next(group, estimate, (q, q_rate), wheel, stance[row] > 0.5, period, ground)
         poses.append(estimate.X_WB)
     found = np.array(poses)
     yaw = np.unwrap(np.arctan2(found[:, 1, 0], found[:, 0, 0]))

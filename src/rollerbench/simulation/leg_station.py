@@ -80,7 +80,7 @@ class LegStation(Diagram):
         reference_q_xyt (3): where the accepted twists lead to [m, m, rad].
         reference_v_xyw_B (3): the accepted twist, smoothed [m/s, m/s, rad/s].
         desired (6): pose of the body on its reference, x, y, z [m], roll, pitch, yaw [rad].
-        stance (n_legs): shares of its load that each foot shall bear, 0 in the air to 1.
+        stance (n_legs): 1 for feet that shall stand, 0 for those in the air.
         plan: the `LegPlan`.
         joint_state (2 n): measured angles, then rates, leg by leg, each leg's joints and then its wheel [rad, rad/s].
         motor_efforts (n): torques of the motors in the same order [N m].
