@@ -139,5 +139,26 @@ def octopod() -> Data:
     }
 
 
+def mixed_legs() -> Data:
+    """Six legs: those in the middle have three joints, and feet that do not roll."""
+    data = octopod()
+    outer = data["legs"][0]
+    middle = {
+        "links": [
+            {"alpha_deg": 90, "mass": 0.5},
+            {"a": 0.2, "mass": 0.7},
+            {"a": 0.22, "theta_offset_deg": -90, "mass": 0.6},
+        ],
+        "wheel": {**outer["wheel"], "driven": False},
+    }
+    legs = []
+    for side, y in (("left", 1), ("right", -1)):
+        for place, x in (("front", 0.33), ("middle", 0.0), ("rear", -0.33)):
+            leg = {**outer, "name": f"{side}_{place}", "hip": [x, 0.2 * y, 0.0], "mounting_deg": 90.0 * y}
+            leg["postures"] = {"insect": [0, 20, -110, 90 * y]}
+            legs.append({**leg, **middle, "postures": {"insect": [0, 20, -20]}} if place == "middle" else leg)
+    return {**data, "name": "test_mixed_legs", "postures": [{"name": "insect", "hold": "least"}], "legs": legs}
+
+
 ALL = {"mecanum": mecanum, "cart": cart, "kiwi": kiwi, "swerve": swerve, "mixed": mixed}
 LEGGED = {"quadruped": quadruped, "octopod": octopod}

@@ -180,9 +180,9 @@ class LegPlanner:
             ready = not wound_up and (not plan.at_rest or wheeling.aligned(plan.wheeling, request))
             plan = replace(plan, wheeling=replace(plan.wheeling, wound_up=wound_up))
             return replace(plan, accepted=request if ready else np.zeros(3), request=request, status="")
-        if np.array_equal(request, plan.request):
+        if np.array_equal(request, plan.request) and np.array_equal(command.offset, plan.offset.target):
             return plan
-        share = self.stances.reachable_share(plan.posture.name, plan.schedule, request, plan.offset.value)
+        share = self.stances.reachable_share(plan.posture.name, plan.schedule, request, command.offset)
         status = "" if share == 1 else f"the command is beyond the legs' reach; followed at {share:.0%}"
         return replace(plan, request=request, accepted=share * request, status=status)
 

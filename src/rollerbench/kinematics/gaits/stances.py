@@ -10,12 +10,19 @@ from rollerbench.kinematics import odometry
 from rollerbench.kinematics.gaits.gait import Schedule
 from rollerbench.kinematics.gaits.plan import rotation
 from rollerbench.kinematics.gaits.plane import placed
+from rollerbench.kinematics.gaits.smooth import bump, quintic
 from rollerbench.kinematics.legs.group import Hold, LegGroup
 
 Array = NDArray[np.float64]
 
 REACH_TOLERANCE = 1e-4
 """Feet this close to their targets count as there [m]."""
+
+SWING_CHECKS = (0.1, 0.3, 0.5, 0.7, 0.9)
+"""Parts of a swing at which it is checked whether feet reach it [-]."""
+
+RESERVE = 1.2
+"""How much faster than asked steady walking must be within reach, as starts and stops leave feet farther behind [-]."""
 
 UNDER_HIP = 0.02
 """Feet this close to the axis of their hip stand under it [m]."""
@@ -104,12 +111,22 @@ class Stances:
         return low
 
     def _reaches(self, posture: str, gait: Schedule, v_xyw_B: Array, offset: Array) -> bool:
-        """Whether feet reach both ends of their strides, and lift in the middle."""
-        half, lift = 0.5 * gait.duty * gait.gait.period, gait.gait.lift
+        """Whether feet reach all places of a period of steady walking."""
+        half, swing = 0.5 * gait.duty * gait.gait.period, (1 - gait.duty) * gait.gait.period
         turned = rotation(*offset[3:])
         place = np.array([offset[0], offset[1], self._height[posture] + offset[2]])
-        for time, height in ((-half, 0.0), (-0.5 * half, 0.0), (0.0, lift), (0.5 * half, 0.0), (half, 0.0)):
-            feet = placed(odometry.integrate(np.zeros(3), -v_xyw_B, time), self._home[posture])
+
+        def after(time: float) -> Array:
+            """Where feet (k, 2) on the ground are this long after they were home [s]."""
+            return placed(odometry.integrate(np.zeros(3), -RESERVE * v_xyw_B, time), self._home[posture])
+
+        strides = [(after(part * half), 0.0) for part in (-1.0, -0.5, 0.5, 1.0)]
+        for u in SWING_CHECKS:
+            # Near its ends a swing reaches farther than the stance, for the body goes on.
+            s = quintic(u)
+            flat = (1 - s) * after(half + u * swing) + s * after(-half - (1 - u) * swing)
+            strides.append((flat, gait.gait.lift * float(bump(u))))
+        for feet, height in strides:
             centers = np.column_stack([feet, height + self.group.wheel_radius])
             if not self.solve(posture, (centers - place) @ turned)[1]:
                 return False
