@@ -70,8 +70,8 @@ LEG_COLUMNS: dict[str, str] = {
 }
 """Columns of each leg, named leg.column, and their units; joint_ and effort_ are followed by the joint's number.
 
-foot is the lowest point of the foot's wheel and slip its velocity over the ground, in W; stance is the share of its
-load that the foot shall bear, load what it bears. The body's desired height and inclination are in desired_z,
+foot is the lowest point of the foot's wheel and slip its velocity over the ground, in W; stance is 1 for a foot that
+shall stand and 0 for one in the air, load what it bears. The body's desired height and inclination are in desired_z,
 desired_roll and desired_pitch.
 """
 

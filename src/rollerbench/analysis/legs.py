@@ -10,7 +10,7 @@ from rollerbench.recording import Recording
 Array = NDArray[np.float64]
 
 STANDS = 0.5
-"""Feet that shall bear this share of their load stand [-]."""
+"""Feet whose stance is above this stand [-]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

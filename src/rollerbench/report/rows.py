@@ -24,6 +24,8 @@ def summary_rows(summary: Mapping[str, Any]) -> list[Row]:
         *(_leg_rows(summary["legs"]) if "legs" in summary else _wheel_rows(summary)),
         ("Real-time factor", f"{summary['realtime_factor']:.1f}, {summary['engine']}"),
     ]
+    if "legs" in summary and summary["error_budget"]["half_step"]:
+        rows.append(_half_step_row(summary["error_budget"]["half_step"]))
     if summary["cross_check"]:
         rows += _cross_check_rows(summary["cross_check"])
     if summary["failure"]:
@@ -47,6 +49,13 @@ def _leg_rows(legs: Mapping[str, Any]) -> list[Row]:
         ("Stability margin", f"{_mm(legs['smallest_static_margin'])} at least, as planned"),
         ("Joint torque", f"{legs['largest_effort']:.1f} N m at most"),
     ]
+
+
+def _half_step_row(change: Mapping[str, float]) -> Row:
+    return (
+        "Half the step",
+        f"ends {_mm(math.hypot(change['x'], change['y']))}, {_degrees(change['yaw'])} from this run",
+    )
 
 
 def _cross_check_rows(second: Mapping[str, Any]) -> list[Row]:

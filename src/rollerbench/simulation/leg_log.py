@@ -54,9 +54,10 @@ def leg_recording(station: LegStation, scenario: Scenario, context: Context) -> 
     columns |= _named(("reference_vx", "reference_vy", "reference_wz"), twist)
     columns |= _named(("odometry_x", "odometry_y", "odometry_yaw"), odometry)
     columns |= _named(("desired_z", "desired_roll", "desired_pitch"), desired[:, 2:5])
-    columns |= _leg_columns(scenario.robot, rotation.as_matrix(), (p_WB, w_WB, v_WB), joints)
-    efforts, loads = data["motor_efforts"][:end], resampled(data["normal_forces"])
-    columns |= _effort_columns(scenario.robot, efforts, stance, loads)
+    rates = model.leg_state_matrix()[len(joints[0]) // 2 :, model.plant.num_positions(model.model_instance) :]
+    pressed = data["contact_efforts"][:end] @ rates.T
+    columns |= _leg_columns(scenario.robot, rotation.as_matrix(), (p_WB, w_WB, v_WB), joints, pressed)
+    columns |= _effort_columns(scenario.robot, data["motor_efforts"][:end], stance)
     return Recording(columns=columns, wheel_names=(), metadata=_provenance(scenario))
 
 
@@ -81,9 +82,10 @@ def _odometry(scenario: Scenario, joints: Array, stance: Array, desired: Array, 
     pose[2, 3] = desired[2]
     estimate = stance_start(group, group.from_vector(angles[0])[0], pose)
     poses = [pose]
+    ground = None if scenario.ground.steps else np.zeros(len(scenario.robot.legs))
     for row in chosen[1:]:
         (q, _), (q_rate, wheel) = group.from_vector(angles[row]), group.from_vector(rates[row])
-        estimate = stance_next(group, estimate, (q, q_rate), wheel, stance[row], period)
+        estimate = stance_next(group, estimate, (q, q_rate), wheel, stance[row] > 0.5, period, ground)
         poses.append(estimate.X_WB)
     found = np.array(poses)
     yaw = np.unwrap(np.arctan2(found[:, 1, 0], found[:, 0, 0]))
@@ -91,8 +93,10 @@ def _odometry(scenario: Scenario, joints: Array, stance: Array, desired: Array, 
     return np.array([np.interp(time, time[chosen], column) for column in planar.T]).T
 
 
-def _leg_columns(robot: Robot, R_WB: Array, body: tuple[Array, Array, Array], joints: Array) -> dict[str, Array]:
-    """Feet, joints and slip, one leg after the other."""
+def _leg_columns(
+    robot: Robot, R_WB: Array, body: tuple[Array, Array, Array], joints: Array, pressed: Array
+) -> dict[str, Array]:
+    """Feet, joints, slip and loads; the contacts press on joints and wheels by pressed (n, ...) [N m]."""
     group = LegGroup(robot)
     columns: dict[str, Array] = {}
     p_WB, w_WB, v_WB = body
@@ -114,6 +118,12 @@ def _leg_columns(robot: Robot, R_WB: Array, body: tuple[Array, Array, Array], jo
         place = p_WB + center - [0.0, 0.0, leg.wheel.radius]
         values = dict(zip(("foot_x", "foot_y", "foot_z"), place.T, strict=True))
         values |= {"slip_x": slip[:, 0], "slip_y": slip[:, 1]}
+        # The force f of the ground turns the joints by J^T f.
+        down = leg.wheel.radius * R_WB[:, np.newaxis, 2, :]
+        arms = frames[:, -1:, :3, 3] - down - frames[:, :-1, :3, 3]
+        lever = np.cross(frames[:, :-1, :3, 2], arms)
+        force = (np.linalg.pinv(lever, rcond=1e-6) @ pressed[:, own, np.newaxis])[..., 0]
+        values |= {"load": np.einsum("nj,nj->n", R_WB[:, 2, :], force)}
         values |= {f"joint_{k + 1}": angles[:, first + k] for k in range(count)}
         values |= {"wheel": angles[:, first + count], "wheel_speed": rates[:, first + count]}
         columns |= {f"{leg.name}.{name}": value for name, value in values.items()}
@@ -121,13 +131,13 @@ def _leg_columns(robot: Robot, R_WB: Array, body: tuple[Array, Array, Array], jo
     return columns
 
 
-def _effort_columns(robot: Robot, efforts: Array, stance: Array, loads: Array) -> dict[str, Array]:
+def _effort_columns(robot: Robot, efforts: Array, stance: Array) -> dict[str, Array]:
     columns: dict[str, Array] = {}
     first = 0
     for index, leg in enumerate(robot.legs):
         names = [*(f"effort_{k + 1}" for k in range(len(leg.links))), "wheel_effort"]
         columns |= {f"{leg.name}.{name}": efforts[:, first + k] for k, name in enumerate(names)}
-        columns |= {f"{leg.name}.stance": stance[:, index], f"{leg.name}.load": loads[:, index]}
+        columns |= {f"{leg.name}.stance": stance[:, index]}
         first += len(names)
     return columns
 

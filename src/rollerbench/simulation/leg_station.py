@@ -80,10 +80,12 @@ class LegStation(Diagram):
         reference_q_xyt (3): where the accepted twists lead to [m, m, rad].
         reference_v_xyw_B (3): the accepted twist, smoothed [m/s, m/s, rad/s].
         desired (6): pose of the body on its reference, x, y, z [m], roll, pitch, yaw [rad].
-        stance (n_legs): shares of its load that each foot shall bear, 0 in the air to 1.
+        stance (n_legs): 1 for feet that shall stand, 0 for those in the air.
         plan: the `LegPlan`.
         joint_state (2 n): measured angles, then rates, leg by leg, each leg's joints and then its wheel [rad, rad/s].
         motor_efforts (n): torques of the motors in the same order [N m].
+        contact_efforts (nv): the contacts' forces on the velocities of the robot's model instance, as the plant orders
+            them [N, N m].
         normal_forces (n_legs): loads of the feet [N].
         slip_speeds (n_legs): how fast feet slide over the ground [m/s].
         odometry_q_xyt (3): pose from the legs that stand [m, m, rad]; with a closed loop only.
@@ -162,6 +164,7 @@ class LegStation(Diagram):
             "plan": planner.GetOutputPort("plan"),
             "joint_state": joints.get_output_port(),
             "motor_efforts": servo.GetOutputPort("motor_efforts"),
+            "contact_efforts": plant.get_generalized_contact_forces_output_port(model.model_instance),
             "normal_forces": contacts.GetOutputPort("normal_forces"),
             "slip_speeds": contacts.GetOutputPort("slip_speeds"),
             "contact_results": plant.get_contact_results_output_port(),
@@ -195,9 +198,9 @@ class LegStation(Diagram):
             builder.ExportOutput(port, name)
         logs = {}
         if log:
-            for name in ("state", "motor_efforts"):
+            for name in ("state", "motor_efforts", "contact_efforts"):
                 logs[name] = LogVectorOutput(outputs[name], builder, publish_period=scenario.plant.time_step)
-            slow = ("reference_q_xyt", "reference_v_xyw_B", "desired", "stance", "normal_forces", "odometry_q_xyt")
+            slow = ("reference_q_xyt", "reference_v_xyw_B", "desired", "stance", "odometry_q_xyt")
             for name in outputs.keys() & set(slow):
                 logs[name] = LogVectorOutput(outputs[name], builder, publish_period=control.period)
         if meshcat is not None:

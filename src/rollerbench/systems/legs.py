@@ -51,7 +51,7 @@ class GaitPlanner(LeafSystem):
         q_xyt (3): where the accepted twists alone lead to: the reference [m, m, rad].
         v_xyw_B (3): the accepted twist, smoothed [m/s, m/s, rad/s].
         desired (6): x, y, z [m], roll, pitch, yaw [rad] of the body on its reference, offset included.
-        stance (n_legs): shares of its load that each foot bears, 0 in the air to 1.
+        stance (n_legs): 1 for feet that shall stand, 0 for those in the air.
     """
 
     def __init__(
@@ -90,7 +90,7 @@ class GaitPlanner(LeafSystem):
         self.DeclareVectorOutputPort("foot_positions", 3 * count, self._calc_feet, own)
         self.DeclareVectorOutputPort("q_xyt", 3, lambda c, out: out.SetFromVector(self.plan(c).reference), own)
         self.DeclareVectorOutputPort("desired", 6, lambda c, out: out.SetFromVector(self.plan(c).desired), own)
-        self.DeclareVectorOutputPort("stance", count, lambda c, out: out.SetFromVector(self.plan(c).load), own)
+        self.DeclareVectorOutputPort("stance", count, lambda c, out: out.SetFromVector(self.plan(c).swing < 0), own)
         self.DeclareVectorOutputPort("v_xyw_B", 3, lambda c, out: out.SetFromVector(self.plan(c).twist.value), own)
 
     def plan(self, context: Context) -> LegPlan:

@@ -62,8 +62,10 @@ class StanceOdometry(LeafSystem):
             return
         angles, rates = np.split(np.asarray(self._state.Eval(context)), 2)
         (q, _), (q_rate, wheel) = self._group.from_vector(angles), self._group.from_vector(rates)
-        load = self._plan.Eval(context).load
-        following = stance_next(self._group, self.estimate(context), (q, q_rate), wheel, load, self._period)
+        plan: LegPlan = self._plan.Eval(context)
+        stands, ground = plan.swing < 0, plan.feet_P[:, 2]
+        estimate = self.estimate(context)
+        following = stance_next(self._group, estimate, (q, q_rate), wheel, stands, self._period, ground)
         state.get_mutable_abstract_state(0).set_value(following)
 
     def _calc_pose(self, context: Context, output: BasicVector) -> None:

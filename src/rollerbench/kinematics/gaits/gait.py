@@ -37,11 +37,14 @@ GAITS = {
     for gait in (
         Gait(name="tripod", duty=0.55, lag=1 / 2, offset=1 / 2),
         Gait(name="ripple", duty=2 / 3, lag=2 / 3, offset=1 / 2),
-        Gait(name="amble", duty=2 / 3, lag=1 / 3, offset=1 / 3),
+        Gait(name="amble", duty=0.7, lag=1 / 3, offset=1 / 3),
         Gait(name="wave", duty=0, lag=0, offset=1 / 2),
     )
 }
-"""The common gaits. Source: McGhee and Frank (1968) for wave gaits; tripod to wave differ in their duty."""
+"""The common gaits; where legs change over in groups, both groups stand for a moment.
+
+Source: McGhee and Frank (1968) for wave gaits.
+"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -10,9 +10,6 @@ from rollerbench.kinematics.legs.group import LegGroup
 
 Array = NDArray[np.float64]
 
-BEARS = 0.2
-"""Feet that bear this share of their load count as standing [-]."""
-
 SUSPECT = 0.003
 """A foot so far from where the others put it may have slipped [m]."""
 
@@ -46,7 +43,13 @@ def stance_start(group: LegGroup, q: Array, X_WB: Array) -> StanceEstimate:
 
 
 def stance_next(
-    group: LegGroup, estimate: StanceEstimate, joints: tuple[Array, Array], wheel_speed: Array, load: Array, dt: float
+    group: LegGroup,
+    estimate: StanceEstimate,
+    joints: tuple[Array, Array],
+    wheel_speed: Array,
+    stands: NDArray[np.bool_],
+    dt: float,
+    ground: Array | None = None,
 ) -> StanceEstimate:
     """The estimate a moment dt later [s].
 
@@ -58,13 +61,14 @@ def stance_next(
         estimate: The estimate before.
         joints: Measured joint angles and rates (k, n) [rad, rad/s].
         wheel_speed: Measured wheel speeds (k,) [rad/s].
-        load: Shares (k,) of their load that the feet bear.
+        stands: Which feet (k,) are on the ground.
         dt: Time since then [s].
+        ground: Heights (k,) of the ground under the feet, where they are known [m]; they keep height and inclination
+            from drifting.
     """
     q, rates = joints
     frames = group.frames(q)
     places = frames[:, -1, :3, 3]
-    stands = load > BEARS
     fit = stands & estimate.stood
     rotation = estimate.X_WB[:3, :3]
     centers = estimate.centers_W
@@ -83,6 +87,8 @@ def stance_next(
     else:
         pose, slipped = estimate.X_WB, np.zeros(len(fit), dtype=bool)
     seen = places @ pose[:3, :3].T + pose[:3, 3]
+    if ground is not None:
+        seen[:, 2] = ground + group.wheel_radius
     # A foot that slipped stands where it is now.
     keeps = (fit & ~slipped)[:, np.newaxis]
     return replace(estimate, X_WB=pose, centers_W=np.where(keeps, centers, seen), stood=stands, slipped=slipped)
