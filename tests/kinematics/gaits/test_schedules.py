@@ -68,7 +68,13 @@ def test_the_tripod_has_two_groups_that_take_turns(make) -> None:
 def test_ripple_and_amble_keep_four_of_six_feet_on_the_ground(gait: str) -> None:
     flying = in_the_air(gait, rb.load_robot("wheel_leg_hexapod"))
     assert flying.sum(axis=1).max() == 2
-    assert flying.sum(axis=1).min() == 2
+
+
+@pytest.mark.parametrize("gait", ["tripod", "amble"])
+def test_groups_that_change_over_stand_together_for_a_moment(gait: str) -> None:
+    # Otherwise too few feet would stand in two plans in a row to tell where the body is.
+    flying = in_the_air(gait, rb.load_robot("wheel_leg_hexapod"))
+    assert flying.sum(axis=1).min() == 0
 
 
 def test_the_amble_lifts_pairs_and_the_ripple_overlaps() -> None:
