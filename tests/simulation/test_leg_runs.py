@@ -126,7 +126,9 @@ def test_a_walk_up_a_slope() -> None:
 def test_a_walk_over_a_step_that_feet_feel() -> None:
     step = {"start": 0.35, "end": 0.65, "height": 0.02}
     walk = {"duration": 4.4, "v_xyw_B": [0.15, 0, 0]}
-    recording, legs = ran(shortened("hexapod_step", walk, ground={"steps": [step]}, plant__time_step=0.004, command={"lift": 0.06}))
+    recording, legs = ran(
+        shortened("hexapod_step", walk, ground={"steps": [step]}, plant__time_step=0.004, command={"lift": 0.06})
+    )
     # The front feet, 0.33 m ahead, are over the step and some have left it.
     assert recording.q_xyt[-1, 0] > 0.5
     on_step = [recording.columns[f"{name}.foot_z"].max() for name in ("front_left", "front_right")]

@@ -272,14 +272,13 @@ def test_rolling_wheels_rest_on_the_ground_along_their_way(make) -> None:
     arm = -group.wheel_radius[:, np.newaxis] * up
     turning = spin + speed[:, np.newaxis] * axle
 
-    def along(lowest):
-        ahead = np.cross(axle, up)
-        return np.sum(lowest * ahead, axis=1)
-
-    assert_allclose(along(velocity + np.cross(turning, arm)), 0.0, atol=1e-12)
-    # A centre that moves across its wheel as `rolling` says leaves the lowest point at rest altogether.
+    driven = np.array([leg.wheel.driven for leg in group.robot.legs])
     ahead = np.cross(axle, up) / np.linalg.norm(np.cross(axle, up), axis=1, keepdims=True)
-    following = ahead * np.sum(velocity * ahead, axis=1, keepdims=True) + across
+    lowest = velocity + np.cross(turning, arm)
+    assert_allclose(np.sum(lowest * ahead, axis=1)[driven], 0.0, atol=1e-12)
+    assert not speed[~driven].any()
+    # A centre that moves where its wheel rolls, and else as `rolling` says, leaves the lowest point at rest altogether.
+    following = across + driven[:, np.newaxis] * ahead * np.sum(velocity * ahead, axis=1, keepdims=True)
     assert_allclose(following + np.cross(turning, arm), 0.0, atol=1e-12)
     assert_allclose(across @ up, 0.0, atol=1e-12)
 

@@ -56,6 +56,7 @@ class LegGroup:
         count, joints = len(robot.legs), max(len(leg.links) for leg in robot.legs)
         self.shape = (count, joints)
         self.wheel_radius = np.array([leg.wheel.radius for leg in robot.legs])
+        self._driven = np.array([leg.wheel.driven for leg in robot.legs])
         self.present = np.zeros((count, joints), dtype=bool)
         rows, self._limits = np.zeros((count, joints, 4)), np.zeros((count, 2, joints))
         self._mass, self._com = np.zeros((count, joints + 1)), np.zeros((count, joints + 1, 3))
@@ -240,7 +241,8 @@ class LegGroup:
         """How ball-shaped wheels roll on level ground as their legs move and lean.
 
         With the arm's angular velocity w, the axle a and the wheel's speed s the ball's lowest point rests if
-        v = (w + s a) x R up. Along t = a x up the wheel settles that; across it the ball rolls with the arm.
+        v = (w + s a) x R up. Along t = a x up the wheel settles that; across it the ball rolls with the arm, and so it
+        does altogether where no motor turns the wheel.
 
         Args:
             frames: Poses from `frames`.
@@ -249,8 +251,8 @@ class LegGroup:
             up_B: Unit vector (3,) out of the ground, in B.
 
         Returns:
-            Wheel speeds (k,) [rad/s], and velocities (k, 3) across the wheels with which leaning makes the centres
-            roll, in B [m/s].
+            Wheel speeds (k,) [rad/s], and velocities (k, 3) with which leaning makes the centres roll, across driven
+            wheels, in B [m/s].
         """
         axle = frames[:, -1, :3, 2]
         ahead = _cross(axle, up_B)
@@ -259,7 +261,8 @@ class LegGroup:
         leaning = _cross(w_F_B, up_B) * self.wheel_radius[:, np.newaxis]
         speed = np.sum((v_F_B - leaning) * ahead, axis=1) / (self.wheel_radius * flat[:, 0])
         across = _cross(np.broadcast_to(up_B, ahead.shape), ahead)
-        return speed, across * np.sum(leaning * across, axis=1, keepdims=True)
+        roll = np.where(self._driven[:, np.newaxis], across * np.sum(leaning * across, axis=1, keepdims=True), leaning)
+        return np.where(self._driven, speed, 0.0), roll
 
 
 def _cross(a: Array, b: Array) -> Array:
