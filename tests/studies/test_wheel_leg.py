@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import rollerbench as rb
+from rollerbench.kinematics.gaits.planner import START_SHARE
 from rollerbench.resources import scenario_files
 from rollerbench.studies import leg_support, leg_walks, reproduce, song, wheel_leg
 from rollerbench.studies.paper import Findings
@@ -127,8 +128,8 @@ def test_the_circumcentre_is_ill_conditioned(findings: Findings) -> None:
 def test_planned_walks(name: str) -> None:
     walk = leg_walks.WALKS[name]
     plan = leg_walks.planned(walk, rb.load_robot("wheel_leg_hexapod"))
-    # The twist follows its command as two lags of 0.2 s do.
-    assert plan.q_xyt[-1] == pytest.approx([walk.speed * (leg_walks.DURATION - 0.4), 0.0, 0.0], abs=1e-3)
+    # The twist takes START_SHARE of a period of 1 s to come up, evenly on both sides of the middle.
+    assert plan.q_xyt[-1] == pytest.approx([walk.speed * (leg_walks.DURATION - 0.5 * START_SHARE), 0.0, 0.0], abs=1e-3)
     assert plan.on_ground.sum(axis=1).min() >= 3
     assert plan.margins.min() > 0.05
     assert plan.feet[..., 2].max() == pytest.approx(0.05, abs=1e-3)
