@@ -101,14 +101,22 @@ class GaitPlanner(LeafSystem):
         port = self._inputs[name]
         return port.Eval(context) if port.HasValue(context) else default
 
+    def _vector(self, context: Context, name: str) -> Array:
+        """The value of a port; 0 where it is not connected, or not finite: then the robot stops."""
+        port = self._inputs[name]
+        if not port.HasValue(context):
+            return np.zeros(port.size())
+        value = np.array(port.Eval(context))
+        return value if np.isfinite(value).all() else np.zeros(port.size())
+
     def _update(self, context: Context, state: State) -> None:
         plan = self.plan(context)
         command = LegCommand(
-            v_xyw_B=self._eval(context, "v_xyw_B", np.zeros(3)),
-            offset=self._eval(context, "body_offset", np.zeros(6)),
+            v_xyw_B=self._vector(context, "v_xyw_B"),
+            offset=self._vector(context, "body_offset"),
             mode=self._eval(context, "mode", self._mode),
-            correction=self._eval(context, "correction", np.zeros(3)),
-            level=self._eval(context, "level", np.zeros(3)),
+            correction=self._vector(context, "correction"),
+            level=self._vector(context, "level"),
         )
         tracked = self._eval(context, "tracked", None) or _planned(self.planner, plan)
         q, _ = tracked.next(self._period)
