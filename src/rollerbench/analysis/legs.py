@@ -64,4 +64,4 @@ def _runs(mask: NDArray[np.bool_], values: Array) -> list[Array]:
 
 def _slid(slip: Array, time: Array) -> float:
     step = float(time[1] - time[0]) if len(time) > 1 else 0.0
-    return float(np.hypot(*(slip.sum(axis=0) * step)))
+    return float(np.hypot(*slip.T).sum() * step)

@@ -129,6 +129,7 @@ class Robot(Part):
     def _wheels_carry_the_body(self) -> Self:
         refuse(list(_kind_problems(self)))
         refuse(list(_leg_problems(self)))
+        refuse(list(_posture_problems(self)))
         refuse([*_name_problems(self), *_room_problems(self), *_support_problems(self)])
         return self
 
@@ -160,6 +161,20 @@ def _leg_problems(robot: Robot) -> Iterator[Problem]:
             if posture.hold != "least" and len(leg.links) != 4:
                 message = f"leg {leg.name} has {len(leg.links)} joints; accepted: least"
                 yield Problem(("postures", robot.standing.index(posture), "hold"), message, posture.hold)
+
+
+def _posture_problems(robot: Robot) -> Iterator[Problem]:
+    """Postures after the first in which feet hang in the air, or the body lies on the ground."""
+    for posture in robot.standing[1:]:
+        feet = robot.feet_B(posture.name)[:, 2] - [leg.wheel.radius for leg in robot.legs]
+        ground = float(feet.min())
+        for index, (leg, foot) in enumerate(zip(robot.legs, feet, strict=True)):
+            if foot - ground > LIFT_TOLERANCE * leg.wheel.radius:
+                message = f"the foot hangs {foot - ground:.4g} m above the ground; accepted: all feet on one level"
+                yield Problem(("legs", index, "postures", posture.name), message, leg.postures[posture.name])
+        if robot.body.box_center[2] - 0.5 * robot.body.size[2] <= ground:
+            message = "the body reaches into the ground; accepted: feet below the body"
+            yield Problem(("legs", 0, "postures", posture.name), message, robot.legs[0].postures[posture.name])
 
 
 def _name_problems(robot: Robot) -> Iterator[Problem]:

@@ -186,6 +186,14 @@ class RobotModel:
         """Index of a joint's rate in the robot's velocities."""
         return int(joint.velocity_start()) - self._first_velocity
 
+    def start_in(self, posture: str) -> None:
+        """Makes a posture, on level ground, the one in which contexts start; before the plant is finalized."""
+        place = RigidTransform([0.0, 0.0, _standing_height(self.robot, posture)])
+        self.plant.SetDefaultFloatingBaseBodyPose(self.body, place)
+        for leg in self.robot.legs:
+            for joint, angle in zip(self.leg_joints(leg), leg.posture(posture), strict=True):
+                joint.set_default_angle(angle)
+
     def set_pose(self, context: Context, q_xyt: ArrayLike, posture: str | None = None) -> None:
         """Stands the robot on level ground at a planar pose (3,) in W, sunk in by what its weight will do.
 
@@ -267,10 +275,10 @@ def add_robot(
         roller_window = builder.AddSystem(RollerWindow(plant, wheels, robot.name))
         roller_window.set_name(f"{plant.GetModelInstanceName(instance)}_rollers")
     model = RobotModel(robot=robot, plant=plant, model_instance=instance, body=body, roller_window=roller_window)
-    plant.SetDefaultFloatingBaseBodyPose(body, RigidTransform([0.0, 0.0, _standing_height(robot)]))
-    for leg in robot.legs:
-        for joint, angle in zip(model.leg_joints(leg), leg.posture(robot.standing[0].name), strict=True):
-            joint.set_default_angle(angle)
+    if robot.legs:
+        model.start_in(robot.standing[0].name)
+    else:
+        plant.SetDefaultFloatingBaseBodyPose(body, RigidTransform([0.0, 0.0, _standing_height(robot)]))
     set_gains(plant, instance, robot, gains or servo_gains(robot))
     return model
 

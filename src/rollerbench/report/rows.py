@@ -46,7 +46,7 @@ def _leg_rows(legs: Mapping[str, Any]) -> list[Row]:
         ("Steps", f"{legs['steps']}"),
         ("Slip in a stance", f"mean {_mm(legs['mean_slip'])}, largest {_mm(legs['largest_slip'])}"),
         ("Height, tilt error", f"largest {_mm(legs['height_error'])}, {_degrees(legs['tilt_error'])}"),
-        ("Stability margin", f"{_mm(legs['smallest_static_margin'])} at least, as planned"),
+        ("Stability margin", f"{_mm(legs['planned_static_margin'])} at least, as planned"),
         ("Joint torque", f"{legs['largest_effort']:.1f} N m at most"),
     ]
 

@@ -116,6 +116,11 @@ class GaitCommand(Part):
         return course
 
 
+def piece_at(course: list[tuple[float, LegCommand]], time: float) -> int:
+    """Index of the piece of a course at a time [s]."""
+    return next(index for index, (end, _) in enumerate(course) if time < end - 1e-9)
+
+
 def command_at(course: list[tuple[float, LegCommand]], time: float) -> LegCommand:
     """The command of a course at a time [s]."""
-    return next(command for end, command in course if time < end - 1e-9)
+    return course[piece_at(course, time)][1]

@@ -34,7 +34,6 @@ def simulate(scenario: Scenario, *, meshcat: Meshcat | None = None, progress: Pr
         ApplySimulatorConfig(simulator_config(scenario), simulator)
     except (RuntimeError, ValueError, SystemExit) as error:
         raise DescriptionError(f"simulator: Drake refuses these settings: {error}") from error
-    station.stand(simulator.get_mutable_context())
     simulator.Initialize()
     if meshcat is not None:
         dress_scene(meshcat, scenario.robot, reference)

@@ -67,8 +67,6 @@ class CommandSource(LeafSystem):
 class LegStation(Diagram):
     """A robot on legs on its ground, driven by a scenario's gait command.
 
-    Start a simulation with `stand(context)`.
-
     Input ports, only if the command comes from outside:
         v_xyw_B (3): body twist command [m/s, m/s, rad/s].
         body_offset (6): pose of the body from where its posture has it [m, rad]; 0 if not connected.
@@ -120,17 +118,20 @@ class LegStation(Diagram):
         # The servo knows the motors' limits; the plant's own would clamp what it adds for stability.
         model = replace(add_robot(plant, unlimited(robot), gains=ServoGains(), visuals=visuals), robot=robot)
         damp_joints(model)
+        course = scenario.command.course(scenario.robot)
+        mode = course[0][1].mode
+        model.start_in(mode.posture)
         steps = [(step.start, step.end, step.height) for step in ground.steps]
         add_ground(plant, friction=ground.friction, slope_deg=ground.slope_deg, steps=steps)
         if meshcat is not None:
             add_ground_visual(plant, robot)
         plant.Finalize()
 
-        course = scenario.command.course(scenario.robot)
-        mode = course[0][1].mode
         planner = builder.AddNamedSystem("gait_planner", GaitPlanner(scenario.robot, control.period, mode))
         tracker = builder.AddNamedSystem("tracker", LegTracker(scenario.robot, control.period, mode, ground.up_W))
-        servo = builder.AddNamedSystem("servo", LegServo(model, scenario.plant.time_step, scenario.errors.lost_legs))
+        servo = builder.AddNamedSystem(
+            "servo", LegServo(model, scenario.plant.time_step, scenario.errors.lost_legs, mode.posture)
+        )
         watch = builder.AddNamedSystem("leg_watch", LegWatch(planner.planner))
         contacts = builder.AddNamedSystem("contacts", SlipMonitor(model))
         joints = builder.AddNamedSystem("joint_state", MatrixGain(model.leg_state_matrix()))
@@ -209,11 +210,3 @@ class LegStation(Diagram):
         self.parts = LegStationParts(
             model=model, scene_graph=scene_graph, planner=planner, tracker=tracker, servo=servo, logs=logs
         )
-
-    def stand(self, context: Context) -> None:
-        """Stands the robot at the origin, in the posture in which it starts, in a context of this diagram."""
-        parts = self.parts
-        posture = parts.planner.plan(parts.planner.GetMyContextFromRoot(context)).posture.name
-        plant_context = parts.model.plant.GetMyMutableContextFromRoot(context)
-        parts.model.set_pose(plant_context, (0.0, 0.0, 0.0), posture)
-        parts.servo.set_angles(parts.servo.GetMyMutableContextFromRoot(context), parts.tracker.angles)

@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 from rollerbench.description import Robot
 from rollerbench.errors import DescriptionError, KinematicsError
 from rollerbench.kinematics.gaits import LegCommand, LegFeedback, LegPlan, LegPlanner, track
+from rollerbench.kinematics.gaits.plan import mode_gait
 from rollerbench.kinematics.legs import static_margin
-from rollerbench.simulation.leg_command import command_at
+from rollerbench.simulation.leg_command import command_at, piece_at
 
 Array = NDArray[np.float64]
 
@@ -63,6 +64,7 @@ def rehearse(
     q, wheel = planner.stances.joints(plan.posture.name), np.zeros(len(plan.load))
     feedback = LegFeedback(q=q, q_rate=0 * q, roll_P=np.zeros((len(q), 3)))
     plans, margins = [plan], [_margin(planner, plan, q, gravity)]
+    entered = [False] * len(course)
     for _ in range(round(duration / period)):
         try:
             following = planner.advance(plan, period, command_at(course, plan.time), feedback)
@@ -76,16 +78,42 @@ def rehearse(
             raise DescriptionError(f"{name}: at t = {plan.time:.2f} s {why}; {_advice(plan)}")
         q, wheel = done.next(period)
         margins.append(_margin(planner, plan, q, gravity))
+        piece = piece_at(course, plans[-1].time)
+        entered[piece] |= _does(plan, course[piece][1])
         if margins[-1] < 0:
-            flying = ", ".join(leg.name for leg, swing in zip(robot.legs, plan.swing, strict=True) if swing >= 0)
-            raise DescriptionError(
-                f"{name}: at t = {plan.time:.2f} s the robot would tip over: with {flying or 'no leg'} in the air its "
-                f"centre of mass is {-1e3 * margins[-1]:.0f} mm outside the support polygon; accepted: a gait with "
-                "more feet on the ground (wave), or a smaller stride"
-            )
+            raise DescriptionError(f"{name}: at t = {plan.time:.2f} s {_tipping(robot, plan, margins[-1])}")
         feedback = LegFeedback(q=q, q_rate=done.q_rate, roll_P=done.roll_P)
         plans.append(plan)
+    for (end, command), done_so in zip(course[:-1], entered, strict=False):
+        if not done_so:
+            mode = command.mode
+            what = "drive" if mode.motion == "drive" else f"walk in its gait {mode_gait(mode).name}"
+            raise DescriptionError(
+                f"{name}: at t = {end:g} s the piece ends before the robot can {what} in the posture {mode.posture}; "
+                "accepted: a longer duration of this piece, or of the one before"
+            )
     return Rehearsal(plans=plans, margins=np.array(margins))
+
+
+def _does(plan: LegPlan, command: LegCommand) -> bool:
+    """Whether the robot does what a command asks for, or may."""
+    mode = command.mode
+    gait = mode.motion == "drive" or not command.v_xyw_B.any() or plan.schedule.gait == mode_gait(mode)
+    return plan.activity == mode.motion and plan.posture.name == mode.posture and gait
+
+
+def _tipping(robot: Robot, plan: LegPlan, margin: float) -> str:
+    flying = [leg.name for leg, swing in zip(robot.legs, plan.swing, strict=True) if swing >= 0]
+    if not flying:
+        return "the robot would tip over where it stands; accepted: less slope, or another posture"
+    air = f"the robot would tip over: with {', '.join(flying)} in the air "
+    if not np.isfinite(margin):
+        return air + "too few feet stand to carry it; accepted: a gait with more feet on the ground (wave)"
+    other = "" if plan.schedule.gait.name == "wave" else "the gait wave, "
+    return (
+        f"{air}its centre of mass is {-1e3 * margin:.1f} mm outside the support polygon; accepted: {other}a smaller "
+        "stride, or a body that leans away from these legs (body: x, y)"
+    )
 
 
 def _advice(plan: LegPlan) -> str:
@@ -93,6 +121,8 @@ def _advice(plan: LegPlan) -> str:
     if 0 < share < 1:
         slower = ", ".join(f"{value:.3g}" for value in plan.accepted)
         return f"accepted: up to v_xyw_B = [{slower}], or a shorter period"
+    if plan.request.any() and share == 0:
+        return "accepted: another posture or pose of the body, in which the legs can step"
     return "accepted: a slower or smaller motion"
 
 

@@ -377,6 +377,16 @@ def _leg_problems(scenario: Scenario) -> Iterator[Problem]:
         yield Problem(
             ("engine",), f"{name} stands on legs, which only Drake simulates; accepted: drake", scenario.engine
         )
+    lift = scenario.command.lift if isinstance(scenario.command, GaitCommand) else math.inf
+    for index, rise in enumerate(scenario.ground.steps):
+        if rise.height >= lift:
+            message = f"feet are lifted by {lift:g} m; accepted: less, or a larger command.lift"
+            yield Problem(("ground", "steps", index, "height"), message, rise.height)
+        wheels = max(leg.wheel.radius for leg in scenario.robot.legs)
+        first, last = scenario.robot.contact_points_B[:, 0].max() + wheels, scenario.robot.contact_points_B[:, 0].min()
+        if rise.start < first and rise.end > last - wheels:
+            message = f"feet stand there at the start; accepted: {first:.3g} or more"
+            yield Problem(("ground", "steps", index, "start"), message, rise.start)
     if scenario.ground.roll_resistance:
         message = "of wheels only; accepted: 0 for a robot on legs"
         yield Problem(("ground", "roll_resistance"), message, scenario.ground.roll_resistance)

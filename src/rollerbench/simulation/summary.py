@@ -69,7 +69,7 @@ def leg_figures(scenario: Scenario, recording: Recording) -> dict[str, Any]:
     """Key figures of legs, SI units."""
     return {
         **dataclasses.asdict(leg_metrics(recording)),
-        "smallest_static_margin": float(scenario.rehearsal.margins.min()),
+        "planned_static_margin": float(scenario.rehearsal.margins.min()),
     }
 
 

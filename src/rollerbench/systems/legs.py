@@ -4,7 +4,7 @@ Planner and odometry are Python systems that work once in a period of control; b
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -20,7 +20,7 @@ from rollerbench.description.inertia import GRAVITY
 from rollerbench.errors import KinematicsError
 from rollerbench.kinematics.gaits.plan import LegCommand, LegFeedback, LegMode, LegPlan
 from rollerbench.kinematics.gaits.planner import LegPlanner
-from rollerbench.kinematics.gaits.tracker import Tracked, track
+from rollerbench.kinematics.gaits.tracker import Tracked, held, track
 from rollerbench.kinematics.legs.group import LegGroup
 from rollerbench.plant import RobotModel
 from rollerbench.sdf.servo import leg_gains
@@ -119,17 +119,25 @@ class GaitPlanner(LeafSystem):
             level=self._vector(context, "level"),
         )
         tracked = self._eval(context, "tracked", None) or _planned(self.planner, plan)
-        q, _ = tracked.next(self._period)
         fault = tracked.fault
+        try:
+            self.planner.require(command.mode)
+        except KinematicsError as error:
+            command, fault = replace(command, mode=self._mode), fault or str(error)
+        q, _ = tracked.next(self._period)
         number = int(self._eval(context, "fault", np.zeros(1))[0])
         if number:
-            fault = f"leg {self.planner.robot.legs[number - 1].name} does not follow"
+            legs = self.planner.robot.legs
+            fault = (
+                f"leg {legs[number - 1].name} does not follow" if 0 < number <= len(legs) else "a leg does not follow"
+            )
         feedback = LegFeedback(
             q=q,
             q_rate=tracked.q_rate,
             roll_P=tracked.roll_P,
             loads=self._eval(context, "foot_loads", None),
             fault=fault,
+            held=bool(tracked.fault),
         )
         following = self.planner.advance(plan, self._period, command, feedback)
         state.get_mutable_abstract_state(0).set_value(following)
@@ -181,8 +189,8 @@ class LegInverseKinematics(LeafSystem):
     def _solved(self, context: Context) -> tuple[Array, Array]:
         q = context.get_discrete_state(0).value().reshape(self._group.shape)
         targets = np.asarray(self._feet.Eval(context)).reshape(-1, 3)
-        near = type(self._hold)(rows=self._hold.rows, values=self._hold.values, heading=self._hold.heading, near=q)
-        solved, _, missed = self._group.inverse(targets, near, iterations=20)
+        solved, _, missed = self._group.inverse(targets, replace(self._hold, near=q), iterations=20)
+        missed = np.nan_to_num(missed, nan=np.inf)
         bad = (missed > 1e-3) | self._group.beyond_limits(solved).any(axis=1)
         return np.where(bad[:, np.newaxis], q, solved), np.where(bad, np.maximum(missed, 1e-9), 0.0)
 
@@ -264,7 +272,7 @@ class LegTracker(LeafSystem):
         reached: _Reached = context.get_abstract_state(0).get_value()
         q, wheel, before = reached.q, reached.wheel, reached.plan
         if plan is before:
-            output.set_value(_still(q, wheel))
+            output.set_value(held(q, wheel))
             return
         following = self._reached(q, wheel, plan)
         poses, places = (reached.pose, following.pose), (reached.centers, following.centers)
@@ -308,13 +316,20 @@ class LegServo(Diagram):
         lag (n): desired minus true angles [rad].
     """
 
-    def __init__(self, model: RobotModel, time_step: float, lost: Mapping[str, float] = MappingProxyType({})) -> None:
+    def __init__(
+        self,
+        model: RobotModel,
+        time_step: float,
+        lost: Mapping[str, float] = MappingProxyType({}),
+        posture: str | None = None,
+    ) -> None:
         """Builds the diagram.
 
         Args:
             model: The robot, in a plant that is finalized.
             time_step: Step of the plant [s].
             lost: Legs whose motors give no torque any more, by name, and from when on [s].
+            posture: The posture in which the robot starts; by default the first.
         """
         super().__init__()
         builder = DiagramBuilder()
@@ -323,6 +338,8 @@ class LegServo(Diagram):
         identity = np.eye(size)
         # The plant's step starts from the angles at its beginning: the sum lags by a step, which D makes up.
         desired = LinearSystem(identity, time_step * identity, identity, time_step * identity, time_step)
+        name = posture or model.robot.standing[0].name
+        desired.configure_default_state(np.concatenate([[*leg.posture(name), 0.0] for leg in model.robot.legs]))
         self._desired = builder.AddNamedSystem("desired_angles", desired)
         angles, rates = np.split(model.leg_state_matrix(), 2)
         lag = builder.AddNamedSystem("lag", Adder(2, size))
@@ -422,17 +439,13 @@ def _gains(model: RobotModel) -> tuple[Array, Array, Array]:
 
 
 def _standing(planner: LegPlanner, plan: LegPlan) -> Tracked:
-    return _still(planner.stances.joints(plan.posture.name), np.zeros(len(plan.load)))
-
-
-def _still(q: Array, wheel: Array) -> Tracked:
-    return Tracked(q=q, wheel=wheel, q_rate=0 * q, wheel_rate=0 * wheel, roll_P=np.zeros((len(q), 3)))
+    return held(planner.stances.joints(plan.posture.name), np.zeros(len(plan.load)))
 
 
 def _planned(planner: LegPlanner, plan: LegPlan) -> Tracked:
     """Legs that are where the plan has them."""
     q, _, _ = planner.group.inverse(planner.centers_B(plan), plan.hold, iterations=10)
-    return _still(q, np.zeros(len(q)))
+    return held(q, np.zeros(len(q)))
 
 
 def _require_period(period: float) -> None:

@@ -147,7 +147,7 @@ class LegWatch(LeafSystem):
         def calc(context: Context, output: BasicVector) -> None:
             lag = np.abs(np.asarray(self._lag.Eval(context))) * joints
             worst = int(np.argmax(lag))
-            output.SetFromVector([numbers[worst] if lag[worst] > LEG_LAG else 0.0])
+            output.SetFromVector([numbers[worst] if not lag[worst] <= LEG_LAG else 0.0])
 
         self.DeclareVectorOutputPort("fault", 1, calc, {self._lag.ticket()})
 

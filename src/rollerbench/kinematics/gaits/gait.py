@@ -31,6 +31,18 @@ class Gait:
     period: float = 1.0
     lift: float = 0.05
 
+    def __post_init__(self) -> None:
+        accepted = {
+            "duty": (self.duty == 0 or 0.05 <= self.duty <= 0.98, "0, or from 0.05 to 0.98"),
+            "period": (0.1 <= self.period <= 100, "from 0.1 to 100 s"),
+            "lift": (0 < self.lift <= 1, "up to 1 m"),
+            "lag": (0 <= self.lag < 1, "from 0 to less than 1"),
+            "offset": (0 <= self.offset < 1, "from 0 to less than 1"),
+        }
+        for name, (good, what) in accepted.items():
+            if not good:
+                raise KinematicsError(f"gait {self.name}: {name} = {getattr(self, name)}: accepted: {what}")
+
 
 GAITS = {
     gait.name: gait

@@ -66,6 +66,7 @@ class LegFeedback:
             plan, in P [m].
         loads: Measured loads (k,) of the feet [N]; None where nobody measures, and the ground is taken to be level.
         fault: What went wrong, in words; the robot then halts.
+        held: Whether the legs could not follow the plan, and stayed where they were.
     """
 
     q: Array
@@ -73,6 +74,7 @@ class LegFeedback:
     roll_P: Array
     loads: Array | None = None
     fault: str = ""
+    held: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -99,6 +101,9 @@ class LegPlan:
         activity: What the robot does.
         request: The twist (3,) that was last asked for, and ...
         accepted: ... the one (3,) within the legs' reach that was made of it.
+        posed: The offset (6,) that was last asked for, and ...
+        offset_share: ... the share of it that is within the legs' reach.
+        before: The plan before this one.
         change: The change of posture that is under way.
         wheeling: What driving on wheels remembers.
         status: What the robot could not do, in words; empty if nothing.
@@ -123,6 +128,9 @@ class LegPlan:
     activity: Activity = "walk"
     request: Array
     accepted: Array
+    posed: Array
+    offset_share: float = 1.0
+    before: "LegPlan | None" = None
     change: Change | None = None
     wheeling: Wheeling | None = None
     status: str = ""

@@ -65,6 +65,7 @@ class LegPlanner:
             hold=self.stances.holds(mode.posture),
             request=np.zeros(3),
             accepted=np.zeros(3),
+            posed=np.zeros(6),
         )
 
     def require(self, mode: LegMode) -> None:
@@ -75,6 +76,12 @@ class LegPlanner:
         """
         if mode.posture not in self.stances.postures:
             raise KinematicsError(f"posture = {mode.posture!r}: accepted: {', '.join(self.stances.postures)}")
+        for name, value, accepted in (
+            ("motion", mode.motion, ("walk", "drive")),
+            ("change", mode.change, ("stepping", "rolling")),
+        ):
+            if value not in accepted:
+                raise KinematicsError(f"{name} = {value!r}: accepted: {', '.join(accepted)}")
         mode_gait(mode)
         locked = [leg.name for leg in self.robot.legs if not leg.wheel.driven]
         if locked and (mode.motion == "drive" or mode.change == "rolling"):
@@ -92,6 +99,9 @@ class LegPlanner:
 
     def advance(self, plan: LegPlan, dt: float, command: LegCommand, feedback: LegFeedback) -> LegPlan:
         """The plan a moment dt later [s]."""
+        if feedback.held and plan.before is not None:
+            plan = _resting(plan.before)
+        start = replace(plan, before=None)
         near = feedback.q + dt * feedback.q_rate
         feet = np.where((plan.swing < 0)[:, np.newaxis], plan.feet_P + feedback.roll_P, plan.feet_P)
         plan = replace(plan, feet_P=feet, hold=replace(plan.hold, near=near), level=command.level)
@@ -105,14 +115,15 @@ class LegPlanner:
         q_xyt = odometry.integrate(plan.q_xyt, moved, dt) if moving else plan.q_xyt
         together = plan.reference is plan.q_xyt and not (moving and command.correction.any())
         reference = q_xyt if together else odometry.integrate(plan.reference, mean, dt)
-        wanted = command.offset if plan.activity in ("walk", "drive") else np.zeros(6)
+        plan = self._posing(plan, command)
         plan = replace(
             plan,
             time=plan.time + dt,
             q_xyt=q_xyt,
             reference=reference,
             twist=twist,
-            offset=plan.offset.follow(wanted, dt, OFFSET_TIME),
+            offset=plan.offset.follow(self._offset(plan, command), dt, OFFSET_TIME),
+            before=start,
         )
         match plan.activity:
             case "walk":
@@ -127,6 +138,21 @@ class LegPlanner:
         ground = plan.feet_P[on_ground, 2].mean(keepdims=True) if on_ground.any() else plan.ground.value
         following = plan.ground.follow(ground, dt, GROUND_TIME)
         return plan if following is plan.ground else replace(plan, ground=following)
+
+    def _posing(self, plan: LegPlan, command: LegCommand) -> LegPlan:
+        """The plan with a status if the legs do not reach from the offset that is asked for now."""
+        if np.array_equal(command.offset, plan.posed):
+            return plan
+        share = self.stances.offset_share(plan.posture.name, command.offset)
+        status = plan.status if share == 1 else f"the body's pose is beyond the legs' reach; taken at {share:.0%}"
+        return replace(plan, posed=command.offset, offset_share=share, status=status)
+
+    def _offset(self, plan: LegPlan, command: LegCommand) -> Array:
+        """The offset that the body shall take on now: none before and in a change."""
+        if plan.activity == "halt":
+            return plan.offset.target
+        stays = plan.activity in ("walk", "drive") and command.mode.posture == plan.posture.name
+        return plan.offset_share * command.offset if stays else np.zeros(6)
 
     def _twist_time(self, plan: LegPlan) -> float:
         """Time in which the accepted twist is taken on [s]."""
@@ -180,9 +206,9 @@ class LegPlanner:
             ready = not wound_up and (not plan.at_rest or wheeling.aligned(plan.wheeling, request))
             plan = replace(plan, wheeling=replace(plan.wheeling, wound_up=wound_up))
             return replace(plan, accepted=request if ready else np.zeros(3), request=request, status="")
-        if np.array_equal(request, plan.request) and np.array_equal(command.offset, plan.offset.target):
+        if np.array_equal(request, plan.request) and np.array_equal(command.offset, plan.posed):
             return plan
-        share = self.stances.reachable_share(plan.posture.name, plan.schedule, request, command.offset)
+        share = self.stances.reachable_share(plan.posture.name, plan.schedule, request, self._offset(plan, command))
         status = "" if share == 1 else f"the command is beyond the legs' reach; followed at {share:.0%}"
         return replace(plan, request=request, accepted=share * request, status=status)
 
@@ -191,3 +217,8 @@ class LegPlanner:
         assert plan.change is not None
         q_to = driving.trailing(self.stances, plan.change.q_to, v_xyw_B)
         return replace(plan, change=posing.prepared(self.stances, replace(plan.change, q_to=q_to), plan))
+
+
+def _resting(plan: LegPlan) -> LegPlan:
+    """The plan without any motion."""
+    return replace(plan, twist=Follower.resting(np.zeros(3)), offset=Follower.resting(plan.offset.value))

@@ -1,5 +1,6 @@
 """The postures of a robot as numbers: joints, feet, heights; and how far the legs reach from them."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -102,13 +103,17 @@ class Stances:
             v_xyw_B: The twist [m/s, m/s, rad/s].
             offset: Offset (6,) of the body from where the posture has it: x, y, z [m], roll, pitch, yaw [rad].
         """
-        if self._reaches(posture, gait, v_xyw_B, offset):
-            return 1.0
-        low, high = 0.0, 1.0
-        for _ in range(7):
-            middle = 0.5 * (low + high)
-            low, high = (middle, high) if self._reaches(posture, gait, middle * v_xyw_B, offset) else (low, middle)
-        return low
+        return _largest(lambda share: self._reaches(posture, gait, share * v_xyw_B, offset))
+
+    def offset_share(self, posture: str, offset: Array) -> float:
+        """The largest share, up to 1, of an offset (6,) of the body that feet at home reach from."""
+        feet = np.column_stack([self._home[posture], self.group.wheel_radius])
+
+        def reaches(share: float) -> bool:
+            place = np.array([*share * offset[:2], self._height[posture] + share * offset[2]])
+            return self.solve(posture, (feet - place) @ rotation(*share * offset[3:]))[1]
+
+        return _largest(reaches)
 
     def _reaches(self, posture: str, gait: Schedule, v_xyw_B: Array, offset: Array) -> bool:
         """Whether feet reach all places of a period of steady walking."""
@@ -131,3 +136,14 @@ class Stances:
             if not self.solve(posture, (centers - place) @ turned)[1]:
                 return False
         return True
+
+
+def _largest(reaches: Callable[[float], bool]) -> float:
+    """The largest share, up to 1, that is reached, to the seventh bisection."""
+    if reaches(1.0):
+        return 1.0
+    low, high = 0.0, 1.0
+    for _ in range(7):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if reaches(middle) else (low, middle)
+    return low

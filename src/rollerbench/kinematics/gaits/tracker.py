@@ -76,11 +76,10 @@ def track(
         stance: Which feet (k,) are on the ground, and roll; the other wheels stand still.
         dt: The period [s].
     """
-    still = np.zeros(len(q))
     target, frames, missed = group.inverse(places[1], hold, tolerance=CLOSE)
     fault = _fault(group, target, missed)
     if fault:
-        return Tracked(q=q, wheel=wheel, q_rate=0 * q, wheel_rate=still, roll_P=np.zeros((len(q), 3)), fault=fault)
+        return held(q, wheel, fault)
     rate = (target - q) / dt
     before, after = poses
     # For the small turns of one period, half of the skew part is the rotation vector.
@@ -94,12 +93,41 @@ def track(
     velocity = (centers - previous) @ after[:3, :3] / dt
     speed, across = group.rolling(frames, spin, velocity, after[2, :3])
     roll = dt * across @ after[:3, :3].T * stance[:, np.newaxis]
-    return Tracked(q=q, wheel=wheel, q_rate=rate, wheel_rate=np.where(stance, speed, 0.0), roll_P=roll, frames=frames)
+    wheel_rate = np.where(stance, speed, 0.0)
+    fault = _too_fast(group, rate, wheel_rate)
+    if fault:
+        return held(q, wheel, fault)
+    return Tracked(q=q, wheel=wheel, q_rate=rate, wheel_rate=wheel_rate, roll_P=roll, frames=frames)
+
+
+def held(q: Array, wheel: Array, fault: str = "") -> Tracked:
+    """Legs that stay where they are."""
+    return Tracked(q=q, wheel=wheel, q_rate=0 * q, wheel_rate=0 * wheel, roll_P=np.zeros((len(q), 3)), fault=fault)
+
+
+def _too_fast(group: LegGroup, rate: Array, wheel_rate: Array) -> str:
+    """Which joint or wheel would turn faster than it can, in words."""
+    joints, wheels = group.max_speeds
+    over = np.abs(rate) - joints
+    if over.max() > 0:
+        leg, joint = np.unravel_index(int(np.argmax(over)), over.shape)
+        return (
+            f"joint {joint + 1} of leg {group.robot.legs[leg].name} would turn at {abs(rate[leg, joint]):.3g} rad/s, "
+            f"faster than {joints[leg, joint]:.3g}"
+        )
+    over = np.abs(wheel_rate) - wheels
+    if over.max() > 0:
+        worst = int(np.argmax(over))
+        return (
+            f"the wheel of leg {group.robot.legs[worst].name} would turn at {abs(wheel_rate[worst]):.3g} rad/s, "
+            f"faster than its max_speed = {wheels[worst]:g}"
+        )
+    return ""
 
 
 def _fault(group: LegGroup, q: Array, missed: Array) -> str:
     legs = group.robot.legs
-    if not np.isfinite(q).all() or missed.max() > MISSED:
+    if not np.isfinite(q).all() or not missed.max() <= MISSED:
         worst = int(np.argmax(np.nan_to_num(missed, nan=np.inf)))
         return f"the foot of leg {legs[worst].name} misses its place by {1e3 * missed[worst]:.3g} mm"
     excess = group.beyond_limits(q)

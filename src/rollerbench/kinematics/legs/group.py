@@ -15,6 +15,9 @@ Array = NDArray[np.float64]
 DAMPING = 1e-5
 """Damping of the inverse, relative to the leg's length [-]: it moves singular legs slowly instead of wildly."""
 
+FASTEST = 40.0
+"""Joints of which no max_speed is described turn no faster [rad/s]: where they would, a leg is near a singular pose."""
+
 LARGEST_STEP = 0.3
 """Largest change of a joint in one iteration of the inverse [rad]."""
 
@@ -47,6 +50,8 @@ class LegGroup:
         shape: Number of legs, and of joints of the longest.
         wheel_radius: Radii (k,) of the feet's wheels [m].
         present: Which joints (k, n) there are.
+        max_speeds: Largest speeds of the joints (k, n), `FASTEST` where none is described, and of the wheels (k,)
+            [rad/s].
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -70,6 +75,9 @@ class LegGroup:
             self._mass[index, :own], self._com[index, :own] = [p.mass for p in parts], [p.com for p in parts]
             self._mass[index, -1] = leg.wheel.mass
         self._in_vector = np.hstack([self.present, np.ones((count, 1), dtype=bool)])
+        fastest = [[link.max_speed or FASTEST for link in leg.links] for leg in robot.legs]
+        fastest = [own + [FASTEST] * (joints - len(own)) for own in fastest]
+        self.max_speeds = np.array(fastest), np.array([leg.wheel.max_speed or np.inf for leg in robot.legs])
         self._links, self._offsets = chain_links(rows), rows[..., 3]
         self._total = float(self._mass.sum()) + robot.body.mass
         self._body = (robot.body.mass, np.array(robot.body.center_of_mass))
