@@ -70,15 +70,9 @@ def stance_next(
     frames = group.frames(q)
     places = frames[:, -1, :3, 3]
     fit = stands & estimate.stood
-    rotation = estimate.X_WB[:3, :3]
     centers = estimate.centers_W
     if fit.sum() >= 3:
-        spin = (group.jacobian(frames)[:, :3] @ rates[..., np.newaxis])[..., 0]
-        spin = (spin + wheel_speed[:, np.newaxis] * frames[:, -1, :3, 2]) @ rotation.T + _body_spin(
-            group, frames, rates, estimate, fit
-        )
-        rolled = np.column_stack([spin[:, 1], -spin[:, 0], np.zeros(len(spin))]) * group.wheel_radius[:, np.newaxis]
-        centers = centers + dt * rolled * fit[:, np.newaxis]
+        centers = centers + dt * _rolling(group, frames, rates, wheel_speed, estimate, fit, dt)
         found = body_pose_from_stance(places[fit], centers[fit], robust=False)
         if fit.sum() >= 4 and found.residuals.max() > SUSPECT:
             found = body_pose_from_stance(places[fit], centers[fit])
@@ -92,6 +86,27 @@ def stance_next(
     # A foot that slipped stands where it is now.
     keeps = (fit & ~slipped)[:, np.newaxis]
     return replace(estimate, X_WB=pose, centers_W=np.where(keeps, centers, seen), stood=stands, slipped=slipped)
+
+
+def _rolling(
+    group: LegGroup,
+    frames: Array,
+    rates: Array,
+    wheel_speed: Array,
+    estimate: StanceEstimate,
+    fit: NDArray[np.bool_],
+    dt: float,
+) -> Array:
+    """Velocities (k, 3) in W, in the middle of the period, at which standing wheels roll [m/s]; 0 for the others."""
+    rotation = estimate.X_WB[:3, :3]
+    body = _body_spin(group, frames, rates, estimate, fit)
+    arm = (group.jacobian(frames)[:, :3] @ rates[..., np.newaxis])[..., 0] @ rotation.T
+    spin = body + arm + wheel_speed[:, np.newaxis] * frames[:, -1, :3, 2] @ rotation.T
+    # In between the body has turned by half of its turn, and the leg is half of its own turn behind.
+    turn = 0.5 * dt * (body - arm)[:, 2]
+    x, y = spin[:, 1], -spin[:, 0]
+    rolled = np.column_stack([x - turn * y, y + turn * x, np.zeros(len(spin))])
+    return rolled * (group.wheel_radius * fit)[:, np.newaxis]
 
 
 def _body_spin(group: LegGroup, frames: Array, rates: Array, estimate: StanceEstimate, fit: NDArray[np.bool_]) -> Array:
