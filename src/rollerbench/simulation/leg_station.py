@@ -5,16 +5,18 @@ from typing import Literal
 
 from pydrake.common.value import Value
 from pydrake.geometry import Meshcat, SceneGraph
-from pydrake.systems.framework import Context, Diagram, DiagramBuilder, LeafSystem
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder, LeafSystem, OutputPort
 from pydrake.systems.primitives import LogVectorOutput, MatrixGain, VectorLogSink
 
-from rollerbench.kinematics.gaits import LegCommand
+from rollerbench.kinematics.gaits import LegCommand, LegMode
 from rollerbench.plant import RobotModel, ServoGains, add_ground, add_robot
 from rollerbench.simulation.drake_config import add_plant
 from rollerbench.simulation.leg_command import GaitCommand, command_at
 from rollerbench.simulation.scenario import Scenario
 from rollerbench.systems import PlanarState, SlipMonitor
-from rollerbench.systems.legs import GaitPlanner, LegServo, LegTracker, damp_joints, unlimited
+from rollerbench.systems.leg_servo import LegServo, damp_joints, unlimited
+from rollerbench.systems.legs import GaitPlanner, LegTracker
 from rollerbench.systems.stance import BodyPoseController, LegWatch, StanceOdometry
 from rollerbench.visualization.scene import add_ground_visual, add_meshcat
 
@@ -38,6 +40,13 @@ class LegStationParts:
     tracker: LegTracker
     servo: LegServo
     logs: dict[str, VectorLogSink]
+
+
+EVERY_STEP = ("state", "motor_efforts", "contact_efforts")
+"""Outputs that are recorded at every step of the plant, and ..."""
+
+EVERY_PERIOD = ("reference_q_xyt", "reference_v_xyw_B", "desired", "stance", "odometry_q_xyt")
+"""... those that change once in a period of control."""
 
 
 class CommandSource(LeafSystem):
@@ -114,17 +123,12 @@ class LegStation(Diagram):
         assert isinstance(scenario.command, GaitCommand)
         builder = DiagramBuilder()
         plant, scene_graph = add_plant(builder, scenario)
-        robot, control, ground = scenario.simulated_robot, scenario.leg_control, scenario.ground
-        # The servo knows the motors' limits; the plant's own would clamp what it adds for stability.
-        model = replace(add_robot(plant, unlimited(robot), gains=ServoGains(), visuals=visuals), robot=robot)
-        damp_joints(model)
+        control, ground = scenario.leg_control, scenario.ground
         course = scenario.command.course(scenario.robot)
         mode = course[0][1].mode
-        model.start_in(mode.posture)
-        steps = [(step.start, step.end, step.height) for step in ground.steps]
-        add_ground(plant, friction=ground.friction, slope_deg=ground.slope_deg, steps=steps)
+        model = _standing_robot(plant, scenario, mode.posture, visuals=visuals)
         if meshcat is not None:
-            add_ground_visual(plant, robot)
+            add_ground_visual(plant, model.robot)
         plant.Finalize()
 
         planner = builder.AddNamedSystem("gait_planner", GaitPlanner(scenario.robot, control.period, mode))
@@ -172,19 +176,7 @@ class LegStation(Diagram):
             "query_object": scene_graph.get_query_output_port(),
         }
         if control.closed_loop:
-            start = planner.planner.start(mode)
-            odometry = StanceOdometry(scenario.robot, planner.planner, start, control.period)
-            builder.AddNamedSystem("stance_odometry", odometry)
-            loop = builder.AddNamedSystem("body_pose_controller", BodyPoseController(control.period))
-            wires += [
-                (planner.GetOutputPort("plan"), odometry.GetInputPort("plan")),
-                (joints.get_output_port(), odometry.GetInputPort("joint_state")),
-                (planner.GetOutputPort("desired"), loop.GetInputPort("desired")),
-                (odometry.GetOutputPort("pose"), loop.GetInputPort("pose")),
-                (loop.GetOutputPort("correction"), planner.GetInputPort("correction")),
-                (loop.GetOutputPort("level"), planner.GetInputPort("level")),
-            ]
-            outputs["odometry_q_xyt"] = odometry.GetOutputPort("q_xyt")
+            outputs["odometry_q_xyt"] = _close_loop(builder, planner, joints.get_output_port(), mode, control.period)
         if command == "external":
             for name in ("v_xyw_B", "body_offset", "mode"):
                 builder.ExportInput(planner.GetInputPort(name), name)
@@ -198,15 +190,45 @@ class LegStation(Diagram):
         for name, port in outputs.items():
             builder.ExportOutput(port, name)
         logs = {}
-        if log:
-            for name in ("state", "motor_efforts", "contact_efforts"):
-                logs[name] = LogVectorOutput(outputs[name], builder, publish_period=scenario.plant.time_step)
-            slow = ("reference_q_xyt", "reference_v_xyw_B", "desired", "stance", "odometry_q_xyt")
-            for name in outputs.keys() & set(slow):
-                logs[name] = LogVectorOutput(outputs[name], builder, publish_period=control.period)
+        for names, period in ((EVERY_STEP, scenario.plant.time_step), (EVERY_PERIOD, control.period)) if log else ():
+            for name in names:
+                if name in outputs:
+                    logs[name] = LogVectorOutput(outputs[name], builder, publish_period=period)
         if meshcat is not None:
             add_meshcat(builder, scene_graph, meshcat, scenario.recording.frames_per_second)
         builder.BuildInto(self)
         self.parts = LegStationParts(
             model=model, scene_graph=scene_graph, planner=planner, tracker=tracker, servo=servo, logs=logs
         )
+
+
+def _standing_robot(plant: MultibodyPlant, scenario: Scenario, posture: str, *, visuals: bool) -> RobotModel:
+    """Adds the robot and its ground to a plant, with joints damped for its servo."""
+    robot, ground = scenario.simulated_robot, scenario.ground
+    # The servo knows the motors' limits; the plant's own would clamp what it adds for stability.
+    model = replace(add_robot(plant, unlimited(robot), gains=ServoGains(), visuals=visuals), robot=robot)
+    damp_joints(model)
+    model.start_in(posture)
+    steps = [(step.start, step.end, step.height) for step in ground.steps]
+    add_ground(plant, friction=ground.friction, slope_deg=ground.slope_deg, steps=steps)
+    return model
+
+
+def _close_loop(
+    builder: DiagramBuilder, planner: GaitPlanner, joint_state: OutputPort, mode: LegMode, period: float
+) -> OutputPort:
+    """Brings the body back to its reference by stance odometry; returns the output port of its planar pose."""
+    start = planner.planner.start(mode)
+    odometry = StanceOdometry(planner.planner.robot, planner.planner, start, period)
+    builder.AddNamedSystem("stance_odometry", odometry)
+    loop = builder.AddNamedSystem("body_pose_controller", BodyPoseController(period))
+    for output, target in (
+        (planner.GetOutputPort("plan"), odometry.GetInputPort("plan")),
+        (joint_state, odometry.GetInputPort("joint_state")),
+        (planner.GetOutputPort("desired"), loop.GetInputPort("desired")),
+        (odometry.GetOutputPort("pose"), loop.GetInputPort("pose")),
+        (loop.GetOutputPort("correction"), planner.GetInputPort("correction")),
+        (loop.GetOutputPort("level"), planner.GetInputPort("level")),
+    ):
+        builder.Connect(output, target)
+    return odometry.GetOutputPort("q_xyt")

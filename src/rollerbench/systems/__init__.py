@@ -3,7 +3,8 @@
 from rollerbench.systems.contacts import RollResistance, SlipMonitor
 from rollerbench.systems.drivetrain import Drivetrain
 from rollerbench.systems.kinematics import ForwardKinematics, InverseKinematics, Odometry, PlanarState
-from rollerbench.systems.legs import GaitPlanner, LegInverseKinematics, LegServo, LegTracker, damp_joints, unlimited
+from rollerbench.systems.leg_servo import LegServo, damp_joints, unlimited
+from rollerbench.systems.legs import GaitPlanner, LegInverseKinematics, LegTracker
 from rollerbench.systems.stance import BodyPoseController, LegWatch, StanceOdometry
 from rollerbench.systems.wheel_speed_controller import PidGains, WheelSpeedController, wheel_speed_gains
 
