@@ -5,6 +5,7 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import CubicSpline
 
 from rollerbench.description import Posture
@@ -26,16 +27,7 @@ ROLL_SPEED = 0.06
 PIVOT_SPEED = 0.6
 """Mean speed at which wheels pivot under their hips [rad/s]."""
 
-BEND = 0.6
-"""Distance of the control points of a wheel's curve from its ends, over that of its ends [-]."""
-
-ASIDE = np.radians(30.0)
-"""By how much a wheel's way to its hip is turned from the leg, to the side to which the wheel rolls [rad]."""
-
-STRAIGHT = 0.65
-"""Share of its distance from the hip on which a wheel rolls straight towards it [-]."""
-
-NEAR = 0.3
+NEAR = 0.2
 """Share of this straight way after which its direction no longer follows from the leg's [-]."""
 
 
@@ -170,35 +162,22 @@ def stepping_path(group: LegGroup, q_from: Array, q_to: Array, pose: Array, lift
 
 
 def rolling_stages(
-    outer: tuple[Array, Array], inner: tuple[Array, Array], hips: Array, heights: tuple[float, float]
+    outer: tuple[Array, Array], pivots: Array, inner: tuple[Array, Array], hips: Array, heights: tuple[float, float]
 ) -> list[Stage]:
     """From feet beside the body to feet under the hips, without a wheel that slips.
 
-    Each wheel rolls along a curve until it points at the axis of its hip, straight under it, and there pivots, while
-    the body climbs.
+    Legs turn about their hips while their feet follow as castors, until they point straight away from the hips; then
+    they roll straight under them, and there pivot, while the body climbs. No leg leans across its wheel on the way.
 
     Args:
         outer: Places (k, 2) in B [m] and directions (k,) [rad] of the wheels at the start.
-        inner: The same at the end.
+        pivots: Where the upright axes of the last joints then are (k, 2), in B [m].
+        inner: Places and directions at the end.
         hips: Where the hips' axes are (k, 2), in B [m].
         heights: Heights of the body at the start and at the end [m].
     """
-    contact, heading = outer
-    arm = contact - hips
-    distance, bearing = np.hypot(*arm.T), np.arctan2(arm[:, 1], arm[:, 0])
-    off = heading - bearing
-    # A wheel rolls back if ahead leads outwards; either way it comes nearer to the hip on the same side.
-    way = -np.sign(np.cos(off))
-    aside = bearing + way * np.sign(np.sin(off)) * ASIDE
-    out = np.column_stack([np.cos(aside), np.sin(aside)])
-    turning = hips + STRAIGHT * distance[:, np.newaxis] * out
-    bend = BEND * np.linalg.norm(turning - contact, axis=1)[:, np.newaxis]
-    ahead = np.column_stack([np.cos(heading), np.sin(heading)])
-    points = [contact, contact + way[:, np.newaxis] * bend * ahead, turning + bend * out, turning]
-    curve = _even(_curve(np.stack(points, axis=1), np.linspace(0.0, 1.0, 401)))
-    slopes = np.gradient(curve, axis=0)
-    tangent = np.unwrap(np.arctan2(slopes[..., 1], slopes[..., 0]), axis=0)
-    turned = heading + tangent - tangent[0]
+    contact, turned = _trailed(outer, pivots, hips)
+    curve, turning = contact, contact[-1]
     near = inner[0] + NEAR * (turning - inner[0])
     turn = inner[1] - turned[-1]
     turn = np.arctan2(np.sin(turn), np.cos(turn))
@@ -217,6 +196,24 @@ def rolling_stages(
     ]
 
 
+def _trailed(outer: tuple[Array, Array], pivots: Array, hips: Array) -> tuple[Array, Array]:
+    """Places (m, k, 2) and directions (m, k) of wheels that follow as castors while their legs turn about their hips.
+
+    The axis of the castor is at the distance r from the hip, in the direction a, and the foot trails from the
+    axis in the direction a + b. It does not slip if da/db = -1 / (1 + r cos(b) / trail); b goes to 0.
+    """
+    arm, tail = pivots - hips, outer[0] - pivots
+    r, trail = np.hypot(*arm.T), np.hypot(*tail.T)
+    away, bearing = np.arctan2(arm[:, 1], arm[:, 0]), np.arctan2(tail[:, 1], tail[:, 0])
+    start = np.arctan2(np.sin(bearing - away), np.cos(bearing - away))
+    b = start * np.linspace(1.0, 0.0, 401)[:, np.newaxis]
+    rate = -1.0 / (1.0 + r * np.cos(b) / trail)
+    a = away + cumulative_trapezoid(rate, b, axis=0, initial=0)
+    axis = hips + r[:, np.newaxis] * np.stack([np.cos(a), np.sin(a)], axis=-1)
+    places = axis + trail[:, np.newaxis] * np.stack([np.cos(a + b), np.sin(a + b)], axis=-1)
+    return places, outer[1] + (a + b) - (away + start)
+
+
 def reversed_stages(stages: list[Stage], height: float) -> list[Stage]:
     """The way back, to a height of the body at its end [m]."""
     heights = [height, *(stage.height for stage in stages[:-1])]
@@ -227,22 +224,3 @@ def reversed_stages(stages: list[Stage], height: float) -> list[Stage]:
 def _line(places: tuple[Array, Array], headings: tuple[Array, Array]) -> Course:
     """Evenly from places (k, 2) and directions (k,) to others."""
     return Course(contact=np.stack(places), heading=np.stack(headings))
-
-
-def _curve(p: Array, u: Array) -> Array:
-    """Points (m, k, 2) of cubic curves with control points (k, 4, 2) at parameters u (m,)."""
-    s = u[:, np.newaxis, np.newaxis]
-    r = 1 - s
-    points: Array = r**3 * p[:, 0] + 3 * r**2 * s * p[:, 1] + 3 * r * s**2 * p[:, 2] + s**3 * p[:, 3]
-    return points
-
-
-def _even(places: Array, count: int = 601) -> Array:
-    """Points (count, k, 2) at even distances along each of k lines (m, k, 2)."""
-    result = np.empty((count, *places.shape[1:]))
-    for leg in range(places.shape[1]):
-        along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(places[:, leg], axis=0), axis=-1))])
-        at = np.linspace(0.0, along[-1], count)
-        for axis in range(2):
-            result[:, leg, axis] = np.interp(at, along, places[:, leg, axis])
-    return result

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollerbench.errors import KinematicsError
-from rollerbench.kinematics.gaits import changes
+from rollerbench.kinematics.gaits import changes, wheeling
 from rollerbench.kinematics.gaits.gait import schedule
 from rollerbench.kinematics.gaits.plan import LegMode, LegPlan, mode_gait
 from rollerbench.kinematics.gaits.plane import placed, seen_from
@@ -101,7 +101,14 @@ def _rolling(stances: Stances, start: str, end: str) -> list[changes.Stage]:
     inner, outer = under[0], start if under[0] == end else end
     places = [(stances.home(name), stances.heading(name)) for name in (outer, inner)]
     heights = (stances.height(outer), stances.height(inner))
-    stages = changes.rolling_stages(places[0], places[1], stances.hips, heights)
+    frames = stances.group.frames(stances.joints(outer))
+    axes = frames[range(len(frames)), stances.last]
+    if np.abs(axes[:, 2, 2]).min() < wheeling.UPRIGHT:
+        raise KinematicsError(
+            f"from {start} to {end} no wheel can roll: accepted: a posture {outer} in which the last joints' axes are "
+            "upright, or stepping"
+        )
+    stages = changes.rolling_stages(places[0], axes[:, :2, 3], places[1], stances.hips, heights)
     return stages if inner == end else changes.reversed_stages(stages, heights[0])
 
 
