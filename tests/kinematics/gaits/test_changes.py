@@ -91,7 +91,7 @@ offsets = st.sampled_from([np.zeros(6), np.zeros(6), np.array([0.02, -0.02, 0.01
 courses = st.lists(st.tuples(st.floats(0.3, 3.0), twists, modes, offsets), min_size=1, max_size=4)
 
 
-@settings(max_examples=40)
+@settings(max_examples=15)
 @given(courses)
 def test_whatever_is_asked_nothing_jumps_or_breaks(course) -> None:
     """Any sequence of commands is followed, or the robot halts and says why."""
