@@ -33,8 +33,9 @@ ELSEWHERE = (
     "cart_radius",
     "cart_slip",
     "cart_back",
+    "hexapod_",
 )
-"""Scenarios that the tests of the ten motions and of the reproductions run, and check in the same way."""
+"""Scenarios that the tests of the ten motions and of the reproductions run, and check in the same way; and legs."""
 
 
 @pytest.mark.parametrize("name", [name for name in scenario_files() if not name.startswith(ELSEWHERE)])

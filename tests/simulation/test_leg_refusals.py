@@ -99,3 +99,9 @@ def test_an_unknown_posture_on_the_port_halts_the_robot() -> None:
     assert plan.activity == "halt"
     assert "accepted: insect, mammal" in plan.status
     assert station.GetOutputPort("q_xyt").Eval(context) == pytest.approx(np.zeros(3), abs=1e-4)
+
+
+def test_a_controller_may_leave_out_its_type() -> None:
+    assert scenario([{"duration": 1.0}], controller={"closed_loop": True}).leg_control.closed_loop
+    with pytest.raises(rb.DescriptionError, match=r"controller.*stands on legs"):
+        scenario([{"duration": 1.0}], controller={"servo": "pid"})

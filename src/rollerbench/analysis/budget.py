@@ -121,6 +121,10 @@ def error_budget(recording: Recording) -> ErrorBudget:
 
 def _robots(recording: Recording) -> tuple[Robot, dict[str, Robot], Literal["textbook", "finite"]]:
     """The robot as the controller knows it, with injected errors one after the other, and the kind of its rollers."""
+    if "legs" in recording.metadata:
+        raise ResourceError(
+            "the recording is of a robot on legs, whose error has no budget; accepted: robots on wheels"
+        )
     try:
         robot = Robot.model_validate(recording.metadata["robot_description"])
         injected = {name: Robot.model_validate(data) for name, data in recording.metadata["injected"].items()}

@@ -77,6 +77,14 @@ class LegControl(Part):
     period: Annotated[Positive, Field(ge=1e-4, le=0.1)] = 0.02
 
 
+def _with_type(value: Any) -> Any:
+    """A controller that leaves out its type: open_loop, or legs if it has fields of legs only."""
+    if not isinstance(value, Mapping) or "type" in value:
+        return value
+    of_legs = value.keys() & (LegControl.model_fields.keys() - OpenLoop.model_fields.keys())
+    return {"type": "legs" if of_legs else "open_loop", **value}
+
+
 UNFIT = {
     "sap": "lets wheels creep over the ground by percents of the path",
     "tamsi": "ignores the wheels' servos, and is gone from newer Drake",
@@ -215,7 +223,9 @@ class Scenario(Part):
     robot: Annotated[Robot, BeforeValidator(_robot_from, json_schema_input_type=str | Robot)]
     duration: Positive
     command: Command
-    controller: Annotated[OpenLoop | LegControl, Field(discriminator="type")] = OpenLoop()
+    controller: Annotated[
+        OpenLoop | LegControl, BeforeValidator(_with_type, json_schema_input_type=OpenLoop | LegControl)
+    ] = Field(default=OpenLoop(), discriminator="type")
     plant: PlantSettings = PlantSettings()
     ground: Ground = Ground()
     errors: Errors = Errors()
