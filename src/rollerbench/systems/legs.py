@@ -135,7 +135,11 @@ class GaitPlanner(LeafSystem):
             fault=fault,
             held=bool(tracked.fault),
         )
-        following = self.planner.advance(plan, self._period, command, feedback)
+        try:
+            following = self.planner.advance(plan, self._period, command, feedback)
+        except KinematicsError as error:
+            # Such as wheels that shall roll between postures where none can.
+            following = self.planner.advance(plan, self._period, command, replace(feedback, fault=str(error)))
         state.get_mutable_abstract_state(0).set_value(following)
 
     def _calc_feet(self, context: Context, output: BasicVector) -> None:

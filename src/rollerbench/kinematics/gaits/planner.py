@@ -177,6 +177,8 @@ class LegPlanner:
         if plan.activity == "drive":
             if here and mode.motion == "drive" and not (plan.wheeling and plan.wheeling.wound_up):
                 return plan
+            if not here and plan.offset.value.any():
+                return plan
             if not here:
                 return posing.begin_change(self.stances, plan, mode, feedback.q)
             # Back into the posture by stepping; to drive on, with the castors behind their axes.
@@ -199,7 +201,10 @@ class LegPlanner:
         if plan.activity == "walk":
             follows &= mode_gait(mode) == plan.schedule.gait
         if not follows or not request.any():
-            return replace(plan, accepted=np.zeros(3), request=np.zeros(3)) if plan.request.any() else plan
+            if not plan.request.any():
+                return plan
+            status = plan.status if plan.activity == "halt" else ""
+            return replace(plan, accepted=np.zeros(3), request=np.zeros(3), status=status)
         if plan.activity == "drive":
             assert plan.wheeling is not None
             wound_up = plan.wheeling.wound_up or driving.wound_up(self.stances, plan.wheeling, feedback.q)
