@@ -1,8 +1,8 @@
 """The Systems of robots on legs: in diagrams built by hand, with ideal feedback and with a plant."""
 
-from dataclasses import inspect
+import inspect
+from dataclasses import dataclass
 
-import dataclass
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
