@@ -1,23 +1,21 @@
 """Simulates a scenario with Drake."""
 
-import math
 import time
 
 import numpy as np
 from pydrake.geometry import Meshcat
 from pydrake.math import RigidTransform, RollPitchYaw
-from pydrake.systems.analysis import ApplySimulatorConfig, Simulator
+from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
 
-from rollerbench.errors import DescriptionError, SimulationError
+from rollerbench.errors import SimulationError
 from rollerbench.kinematics.profile import reference_poses
 from rollerbench.plant import follow_rollers
-from rollerbench.simulation.drake_config import simulator_config
+from rollerbench.simulation.advance import advance, configure, start_recording
 from rollerbench.simulation.log import Progress, Simulated, provenance, recording_of, station_samples
 from rollerbench.simulation.scenario import Scenario
 from rollerbench.simulation.station import Station
-from rollerbench.simulation.watch import CHUNK, SETTLE_TIME, fault
-from rollerbench.visualization.scene import dress_scene
+from rollerbench.simulation.watch import SETTLE_TIME, fault
 
 
 def simulate(scenario: Scenario, *, meshcat: Meshcat | None = None, progress: Progress | None = None) -> Simulated:
@@ -30,22 +28,17 @@ def simulate(scenario: Scenario, *, meshcat: Meshcat | None = None, progress: Pr
     station = Station(scenario, meshcat=meshcat, log=True, visuals=meshcat is not None)
     simulator = Simulator(station)
     follow_rollers(simulator)
-    try:
-        ApplySimulatorConfig(simulator_config(scenario), simulator)
-    except (RuntimeError, ValueError, SystemExit) as error:
-        raise DescriptionError(f"simulator: Drake refuses these settings: {error}") from error
+    configure(simulator, scenario)
     try:
         _stand_at_rest(simulator, station, scenario)
     except (RuntimeError, SystemExit) as error:
         raise SimulationError(f"{scenario.name}: Drake cannot let the robot stand: {error}") from error
     if meshcat is not None:
         times = np.arange(0.0, scenario.duration, scenario.plant.time_step)
-        dress_scene(meshcat, scenario.robot, reference_poses(scenario.motion.twist, times))
-        meshcat.StartRecording(
-            frames_per_second=scenario.recording.frames_per_second, set_visualizations_while_recording=True
-        )
+        start_recording(meshcat, scenario, reference_poses(scenario.motion.twist, times))
     started = time.perf_counter()
-    failure = _advance(simulator, station, scenario, progress)
+    model, plant_context = station.parts.model, _plant_context(station, simulator)
+    failure = advance(simulator, scenario, lambda: fault(model, plant_context), progress)
     wall_time = time.perf_counter() - started
     samples = station_samples(station, scenario, simulator.get_context())
     recording = recording_of(samples, scenario, provenance(scenario, "drake"))
@@ -77,28 +70,3 @@ def _stand_at_rest(simulator: Simulator, station: Station, scenario: Scenario) -
 
 def _plant_context(station: Station, simulator: Simulator) -> Context:
     return station.parts.model.plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
-
-
-def _advance(simulator: Simulator, station: Station, scenario: Scenario, progress: Progress | None) -> str | None:
-    """Simulates to the end; returns what went wrong, or None."""
-    context, model = simulator.get_context(), station.parts.model
-    plant_context = model.plant.GetMyContextFromRoot(context)
-    step, duration = scenario.plant.time_step, scenario.duration
-    # Times are multiples of the step, as Drake counts them, so that the last sample is part of the log.
-    steps, chunk = math.floor(duration / step + 1e-6), max(1, round(CHUNK / step))
-    try:
-        for count in [*range(chunk, steps, chunk), steps]:
-            now = count * step
-            simulator.AdvanceTo(now)
-            what = fault(model, plant_context)
-            if what is not None:
-                return f"at t = {now:.3f} s {what}"
-            if progress is not None:
-                progress(now)
-    except KeyboardInterrupt:
-        return f"interrupted at t = {context.get_time():.3f} s"
-    except SimulationError as error:
-        return str(error)
-    except (RuntimeError, SystemExit) as error:
-        return f"at t = {context.get_time():.3f} s Drake stopped: {error}"
-    return None

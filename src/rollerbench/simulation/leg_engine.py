@@ -5,17 +5,15 @@ import time
 
 import numpy as np
 from pydrake.geometry import Meshcat
-from pydrake.systems.analysis import ApplySimulatorConfig, Simulator
+from pydrake.systems.analysis import Simulator
 
-from rollerbench.errors import DescriptionError, SimulationError
 from rollerbench.plant import RobotModel
-from rollerbench.simulation.drake_config import simulator_config
+from rollerbench.simulation.advance import advance, configure, start_recording
 from rollerbench.simulation.leg_log import leg_recording
 from rollerbench.simulation.leg_station import LegStation
 from rollerbench.simulation.log import Progress, Simulated
 from rollerbench.simulation.scenario import Scenario
-from rollerbench.simulation.watch import CHUNK, NOT_FINITE, TIP_ANGLE, tilt
-from rollerbench.visualization.scene import dress_scene
+from rollerbench.simulation.watch import NOT_FINITE, TIP_ANGLE, tilt
 
 FALLEN = 0.5
 """A body below this share of the height that it should have has fallen [-]."""
@@ -30,49 +28,37 @@ def simulate(scenario: Scenario, *, meshcat: Meshcat | None = None, progress: Pr
     reference = scenario.rehearsal.reference
     station = LegStation(scenario, meshcat=meshcat, log=True, visuals=meshcat is not None)
     simulator = Simulator(station)
-    try:
-        ApplySimulatorConfig(simulator_config(scenario), simulator)
-    except (RuntimeError, ValueError, SystemExit) as error:
-        raise DescriptionError(f"simulator: Drake refuses these settings: {error}") from error
+    configure(simulator, scenario)
     simulator.Initialize()
     if meshcat is not None:
-        dress_scene(meshcat, scenario.robot, reference)
-        meshcat.StartRecording(
-            frames_per_second=scenario.recording.frames_per_second, set_visualizations_while_recording=True
-        )
+        start_recording(meshcat, scenario, reference)
     started = time.perf_counter()
-    failure = _advance(simulator, station, scenario, progress)
+    watch = _Watch(simulator, station)
+    failure = advance(simulator, scenario, watch.look, progress) or watch.halted
     wall_time = time.perf_counter() - started
     recording = leg_recording(station, scenario, simulator.get_context())
     return Simulated(recording=recording, failure=failure, wall_time=wall_time)
 
 
-def _advance(simulator: Simulator, station: LegStation, scenario: Scenario, progress: Progress | None) -> str | None:
-    """Simulates to the end; returns what went wrong, or None."""
-    context, parts = simulator.get_context(), station.parts
-    plant_context = parts.model.plant.GetMyContextFromRoot(context)
-    planner_context = parts.planner.GetMyContextFromRoot(context)
-    step, duration = scenario.plant.time_step, scenario.duration
-    steps, chunk = math.floor(duration / step + 1e-6), max(1, round(CHUNK / step))
-    halted = ""
-    try:
-        for count in [*range(chunk, steps, chunk), steps]:
-            simulator.AdvanceTo(count * step)
-            plan = parts.planner.plan(planner_context)
-            what = _fall(parts.model, plant_context, plan.desired[2])
-            if what is not None:
-                return f"at t = {count * step:.3f} s {what}"
-            if plan.activity == "halt" and not halted:
-                halted = f"at t = {plan.time:.2f} s the robot halted: {plan.status}"
-            if progress is not None:
-                progress(count * step)
-    except KeyboardInterrupt:
-        return f"interrupted at t = {context.get_time():.3f} s"
-    except SimulationError as error:
-        return str(error)
-    except (RuntimeError, SystemExit) as error:
-        return f"at t = {context.get_time():.3f} s Drake stopped: {error}"
-    return halted or None
+class _Watch:
+    """Looks whether a robot fell, and remembers when it first halted.
+
+    Attributes:
+        halted: When and why it halted, in words, or None.
+    """
+
+    def __init__(self, simulator: Simulator, station: LegStation) -> None:
+        self._parts, context = station.parts, simulator.get_context()
+        self._plant_context = station.parts.model.plant.GetMyContextFromRoot(context)
+        self._planner_context = station.parts.planner.GetMyContextFromRoot(context)
+        self.halted: str | None = None
+
+    def look(self) -> str | None:
+        """What makes going on useless, in words, or None."""
+        plan = self._parts.planner.plan(self._planner_context)
+        if plan.activity == "halt" and self.halted is None:
+            self.halted = f"at t = {plan.time:.2f} s the robot halted: {plan.status}"
+        return _fall(self._parts.model, self._plant_context, plan.desired[2])
 
 
 def _fall(model: RobotModel, context: object, height: float) -> str | None:

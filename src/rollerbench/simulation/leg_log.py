@@ -6,6 +6,7 @@ from pydrake.systems.framework import Context
 from scipy.spatial.transform import Rotation
 
 from rollerbench.description import Robot
+from rollerbench.kinematics.legs.chain import geometric_jacobian
 from rollerbench.kinematics.legs.group import LegGroup
 from rollerbench.kinematics.legs.stance import stance_next, stance_start
 from rollerbench.kinematics.odometry import rotate
@@ -106,7 +107,7 @@ def _leg_columns(
         count = len(leg.links)
         own = slice(first, first + count)
         frames = group.leg_frames(index, angles[:, own])
-        jacobian = group.leg_jacobian(frames)
+        jacobian = geometric_jacobian(frames)
         turn = np.einsum("nij,nj->ni", jacobian[:, :3], rates[:, own])
         turn = turn + rates[:, first + count, np.newaxis] * frames[:, -1, :3, 2]
         slide = np.einsum("nij,nj->ni", jacobian[:, 3:], rates[:, own])

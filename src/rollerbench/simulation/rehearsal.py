@@ -22,10 +22,12 @@ class Rehearsal:
     Attributes:
         plans: The plans, a period of control apart, from time 0 on.
         margins: Static stability margins (n,) [m].
+        q_rates: Joint speeds (n, k, m) with which the legs came there [rad/s].
     """
 
     plans: list[LegPlan]
     margins: Array
+    q_rates: Array
 
     @property
     def time(self) -> Array:
@@ -64,7 +66,7 @@ def rehearse(
     q, wheel = planner.stances.joints(plan.posture.name), np.zeros(len(plan.load))
     feedback = LegFeedback(q=q, q_rate=0 * q, roll_P=np.zeros((len(q), 3)))
     plans, margins = [plan], [_margin(planner, plan, q, gravity)]
-    entered = [False] * len(course)
+    rates, entered = [0 * q], [False] * len(course)
     for _ in range(round(duration / period)):
         try:
             following = planner.advance(plan, period, command_at(course, plan.time), feedback)
@@ -84,6 +86,7 @@ def rehearse(
             raise DescriptionError(f"{name}: at t = {plan.time:.2f} s {_tipping(robot, plan, margins[-1])}")
         feedback = LegFeedback(q=q, q_rate=done.q_rate, roll_P=done.roll_P)
         plans.append(plan)
+        rates.append(done.q_rate)
     for (end, command), done_so in zip(course[:-1], entered, strict=False):
         if not done_so:
             mode = command.mode
@@ -92,7 +95,7 @@ def rehearse(
                 f"{name}: at t = {end:g} s the piece ends before the robot can {what} in the posture {mode.posture}; "
                 "accepted: a longer duration of this piece, or of the one before"
             )
-    return Rehearsal(plans=plans, margins=np.array(margins))
+    return Rehearsal(plans=plans, margins=np.array(margins), q_rates=np.array(rates))
 
 
 def _does(plan: LegPlan, command: LegCommand) -> bool:

@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollerbench.description import Robot, load_robot
-from rollerbench.errors import SimulationError
-from rollerbench.kinematics.gaits import LegCommand, LegFeedback, LegMode, LegPlanner, track
-from rollerbench.kinematics.legs import static_margin
+from rollerbench.description.inertia import GRAVITY
+from rollerbench.kinematics.gaits import LegCommand, LegMode
 from rollerbench.report.drawing import Curve, curves, gait_diagram
 from rollerbench.resources import scenario_files
 from rollerbench.simulation import RunResult, Scenario, load_scenario
+from rollerbench.simulation.rehearsal import rehearse
 from rollerbench.studies.paper import Picture, Result
 
 Array = NDArray[np.float64]
@@ -72,29 +72,19 @@ def scenarios() -> dict[str, Scenario]:
 
 
 def planned(walk: Walk, robot: Robot) -> PlannedWalk:
-    """Plans a walk and has the legs track it, without a simulation.
-
-    Raises:
-        SimulationError: a foot misses its place.
-    """
-    planner = LegPlanner(robot)
+    """Has ideal legs carry out a walk, without a simulation."""
     mode = LegMode(posture=walk.posture)
     command = LegCommand(v_xyw_B=np.array([walk.speed, 0.0, 0.0]), offset=np.zeros(6), mode=mode)
-    plan, q, wheel = planner.start(mode), planner.stances.joints(walk.posture), np.zeros(len(robot.legs))
-    rate, roll = np.zeros_like(q), np.zeros((len(q), 3))
-    samples = []
-    for _ in range(round(DURATION / PERIOD)):
-        new = planner.advance(plan, PERIOD, command, LegFeedback(q=q, q_rate=rate, roll_P=roll))
-        places = planner.centers_B(plan), planner.centers_B(new)
-        tracked = track(planner.group, q, wheel, (plan.X_PB, new.X_PB), places, new.hold, new.swing < 0, PERIOD)
-        if tracked.fault:
-            raise SimulationError(f"{walk.name} at {plan.time:.2f} s: {tracked.fault}")
-        (q, wheel), rate, roll, plan = tracked.next(PERIOD), tracked.q_rate, tracked.roll_P, new
-        stance = plan.swing < 0
-        center = planner.group.center_of_mass(planner.group.frames(q))
-        samples.append((plan.time, plan.q_xyt, plan.feet_P, stance, static_margin(places[1][stance], center), rate))
-    time, q_xyt, feet, on_ground, margins, rates = (np.array(column) for column in zip(*samples, strict=True))
-    return PlannedWalk(time=time, q_xyt=q_xyt, feet=feet, on_ground=on_ground, margins=margins, q_rates=rates)
+    gravity = np.array([0.0, 0.0, -GRAVITY])
+    found = rehearse(robot, [(np.inf, command)], DURATION, PERIOD, gravity, walk.name)
+    return PlannedWalk(
+        time=found.time,
+        q_xyt=np.array([plan.q_xyt for plan in found.plans]),
+        feet=np.array([plan.feet_P for plan in found.plans]),
+        on_ground=np.array([plan.swing < 0 for plan in found.plans]),
+        margins=found.margins,
+        q_rates=found.q_rates,
+    )
 
 
 def walk_findings(scenario: str, run: RunResult | None) -> tuple[list[Result], list[Picture]]:

@@ -20,12 +20,20 @@ def jacobian(rows: Array, q: Array) -> Array:
         rows: Denavit-Hartenberg rows (n, 4).
         q: Joint angles (..., n) [rad].
     """
-    frames = chain_frames(rows, q)
-    axes = frames[..., :-1, :3, 2]
-    arms = frames[..., -1:, :3, 3] - frames[..., :-1, :3, 3]
-    out = np.empty((*axes.shape[:-2], 6, axes.shape[-2]))
-    out[..., :3, :] = np.swapaxes(axes, -1, -2)
-    x, y, z = np.moveaxis(axes, -1, 0)
-    u, v, w = np.moveaxis(arms, -1, 0)
-    out[..., 3, :], out[..., 4, :], out[..., 5, :] = y * w - z * v, z * u - x * w, x * v - y * u
-    return out
+    return geometric_jacobian(chain_frames(rows, q))
+
+
+def geometric_jacobian(frames: Array) -> Array:
+    """Geometric Jacobians (..., 6, n) at the ends of chains, rows [angular; linear], from frames (..., n + 1, 4, 4)."""
+    axes, joints = frames[..., :-1, :3, 2], frames[..., :-1, :3, 3]
+    moving = cross(axes, frames[..., -1:, :3, 3] - joints)
+    return np.concatenate([axes, moving], axis=-1).swapaxes(-1, -2)
+
+
+def cross(a: Array, b: Array) -> Array:
+    """Cross product over the last axis; numpy's own is slower on small arrays."""
+    ax, ay, az, bx, by, bz = a[..., 0], a[..., 1], a[..., 2], b[..., 0], b[..., 1], b[..., 2]
+    x = ay * bz - az * by
+    product = np.empty((*x.shape, 3))
+    product[..., 0], product[..., 1], product[..., 2] = x, az * bx - ax * bz, ax * by - ay * bx
+    return product

@@ -9,6 +9,7 @@ from rollerbench.description import Posture, Robot
 from rollerbench.description.inertia import GRAVITY
 from rollerbench.description.legs import chain_links, turned_frames
 from rollerbench.errors import KinematicsError
+from rollerbench.kinematics.legs.chain import cross, geometric_jacobian
 
 Array = NDArray[np.float64]
 
@@ -125,17 +126,9 @@ class LegGroup:
         frames: Array = self._X_BL[leg] @ turned_frames(self._links[leg, :own], q + self._offsets[leg, :own])
         return frames
 
-    def leg_jacobian(self, frames: Array) -> Array:
-        """Geometric Jacobians (..., 6, n) of one leg, rows [w_BF_B; v_BF_B], from its `leg_frames`."""
-        axes, joints = frames[..., :-1, :3, 2], frames[..., :-1, :3, 3]
-        moving = _cross(axes, frames[..., -1:, :3, 3] - joints)
-        return np.concatenate([axes, moving], axis=-1).swapaxes(-1, -2)
-
     def jacobian(self, frames: Array) -> Array:
         """Geometric Jacobians (k, 6, n), rows [w_BF_B; v_BF_B], at the feet's centres."""
-        axes, joints = frames[:, :-1, :3, 2] * self.present[..., np.newaxis], frames[:, :-1, :3, 3]
-        arms = frames[:, -1:, :3, 3] - joints
-        return np.concatenate([axes, _cross(axes, arms)], axis=-1).swapaxes(1, 2)
+        return geometric_jacobian(frames) * self.present[:, np.newaxis]
 
     def headings(self, frames: Array) -> Array:
         """Directions (k,) in which the wheels roll ahead, from B's x axis about its z axis [rad]."""
@@ -175,7 +168,7 @@ class LegGroup:
         if not hold.heading.any():
             return hold.rows, np.where(np.any(hold.rows, axis=1), missing, 0.0)
         axle = frames[:, -1, :3, 2]
-        turning = _cross(frames[:, :-1, :3, 2] * self.present[..., np.newaxis], axle[:, np.newaxis])
+        turning = cross(frames[:, :-1, :3, 2] * self.present[..., np.newaxis], axle[:, np.newaxis])
         flat = np.maximum(axle[:, 0] ** 2 + axle[:, 1] ** 2, 1e-6)
         rows = (axle[:, :1] * turning[..., 1] - axle[:, 1:2] * turning[..., 0]) / flat[:, np.newaxis]
         off = hold.values - self.headings(frames)
@@ -207,7 +200,7 @@ class LegGroup:
         moment = np.cumsum((self._mass[..., np.newaxis] * places)[:, ::-1], axis=1)[:, ::-1]
         arms = moment[:, :-1] - mass[:, :-1, np.newaxis] * frames[:, :-1, :3, 3]
         # A torque about z_i holds what gravity -g up turns: tau = g z . (arm x up).
-        return GRAVITY * np.einsum("knx,knx->kn", frames[:, :-1, :3, 2], _cross(arms, up_B)) * self.present
+        return GRAVITY * np.einsum("knx,knx->kn", frames[:, :-1, :3, 2], cross(arms, up_B)) * self.present
 
     def contact_efforts(self, frames: Array, forces: Array, up_B: Array) -> tuple[Array, Array]:
         """Torques of joints (k, n) and wheels (k,) by which feet press against the ground [N m].
@@ -218,7 +211,7 @@ class LegGroup:
             up_B: Unit vector (3,) out of the ground, in B.
         """
         contact = frames[:, -1, :3, 3] - self.wheel_radius[:, np.newaxis] * up_B
-        moments = _cross(contact[:, np.newaxis] - frames[..., :3, 3], forces[:, np.newaxis])
+        moments = cross(contact[:, np.newaxis] - frames[..., :3, 3], forces[:, np.newaxis])
         efforts = -np.sum(frames[..., :3, 2] * moments, axis=-1)
         return efforts[:, :-1] * self.present, efforts[:, -1]
 
@@ -263,20 +256,11 @@ class LegGroup:
             wheels, in B [m/s].
         """
         axle = frames[:, -1, :3, 2]
-        ahead = _cross(axle, up_B)
+        ahead = cross(axle, up_B)
         flat = np.maximum(np.linalg.norm(ahead, axis=1, keepdims=True), 1e-6)
         ahead = ahead / flat
-        leaning = _cross(w_F_B, up_B) * self.wheel_radius[:, np.newaxis]
+        leaning = cross(w_F_B, up_B) * self.wheel_radius[:, np.newaxis]
         speed = np.sum((v_F_B - leaning) * ahead, axis=1) / (self.wheel_radius * flat[:, 0])
-        across = _cross(np.broadcast_to(up_B, ahead.shape), ahead)
+        across = cross(np.broadcast_to(up_B, ahead.shape), ahead)
         roll = np.where(self._driven[:, np.newaxis], across * np.sum(leaning * across, axis=1, keepdims=True), leaning)
         return np.where(self._driven, speed, 0.0), roll
-
-
-def _cross(a: Array, b: Array) -> Array:
-    """Cross product over the last axis; numpy's own is slower on small arrays."""
-    ax, ay, az, bx, by, bz = a[..., 0], a[..., 1], a[..., 2], b[..., 0], b[..., 1], b[..., 2]
-    x = ay * bz - az * by
-    product = np.empty((*x.shape, 3))
-    product[..., 0], product[..., 1], product[..., 2] = x, az * bx - ax * bz, ax * by - ay * bx
-    return product
