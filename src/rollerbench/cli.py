@@ -77,6 +77,9 @@ def run(
     no_recording: Annotated[
         bool, typer.Option("--no-recording", help="Write no recording.html, which is faster.")
     ] = False,
+    diagram: Annotated[
+        bool, typer.Option("--diagram", help="Draw the simulated diagram, its systems and ports, as diagram.svg.")
+    ] = False,
 ) -> None:
     """Simulate a scenario, compare it with the equations, and write the run folder."""
     from rollerbench import simulation
@@ -86,6 +89,7 @@ def run(
     overrides += [f"engine={engine}"] if engine is not None else []
     overrides += ["check_step=true"] if check_step else []
     overrides += ["recording.html=false"] if no_recording else []
+    overrides += ["recording.diagram=true"] if diagram else []
     overrides += ["simulator.target_realtime_rate=1.0"] if live else []
     loaded = simulation.load_scenario(scenario, overrides=overrides, robot=robot)
     if live and loaded.engine == "mujoco":

@@ -92,7 +92,7 @@ class RollerbenchRunner:
         simulator, scenario = self._simulators[index], self._scenarios[index]
         wall_time = _timed(simulator, self._starts[index], scenario.duration)
         station, context = simulator.get_system(), simulator.get_context()
-        pose = np.array(station.GetOutputPort("q_xyt").Eval(context))
+        pose = np.array(station.GetOutputPort("pose").Eval(context))
         return Run(q_xyt=pose, wall_time=wall_time)
 
     def close(self) -> None:
@@ -167,7 +167,7 @@ def _settled(scenario: rb.Scenario) -> NDArray[np.float64]:
     station = rb.build_station(scenario, command="external")
     simulator = _simulator(station)
     context = simulator.get_mutable_context()
-    station.GetInputPort("v_xyw_B").FixValue(context, np.zeros(3))
+    station.GetInputPort("twist_command").FixValue(context, np.zeros(3))
     model = station.parts.model
     plant_context = model.plant.GetMyMutableContextFromRoot(context)
     model.set_pose(plant_context, (0.0, 0.0, 0.0))

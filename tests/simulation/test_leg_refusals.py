@@ -71,20 +71,20 @@ def test_a_second_posture_in_which_a_foot_hangs() -> None:
         rb.load_robot(data)
 
 
-@pytest.mark.parametrize("port", ["v_xyw_B", "body_offset"])
+@pytest.mark.parametrize("port", ["twist_command", "body_offset"])
 def test_nan_on_a_port_stops_the_robot(port: str) -> None:
     station = rb.build_station(scenario([{"duration": 1.0}]), command="external")
     simulator = Simulator(station)
     context = simulator.get_mutable_context()
-    twist = station.GetInputPort("v_xyw_B")
+    twist = station.GetInputPort("twist_command")
     twist.FixValue(context, [0.1, 0.0, 0.0])
     simulator.AdvanceTo(0.3)
     size = station.GetInputPort(port).size()
     station.GetInputPort(port).FixValue(context, np.full(size, np.nan))
-    if port != "v_xyw_B":
+    if port != "twist_command":
         twist.FixValue(context, np.zeros(3))
     simulator.AdvanceTo(1.5)
-    assert np.abs(station.GetOutputPort("v_xyw_B").Eval(context)).max() < 0.005
+    assert np.abs(station.GetOutputPort("twist").Eval(context)).max() < 0.005
     assert np.isfinite(station.GetOutputPort("motor_efforts").Eval(context)).all()
 
 
@@ -92,13 +92,13 @@ def test_an_unknown_posture_on_the_port_halts_the_robot() -> None:
     station = rb.build_station(scenario([{"duration": 1.0}]), command="external")
     simulator = Simulator(station)
     context = simulator.get_mutable_context()
-    station.GetInputPort("v_xyw_B").FixValue(context, np.zeros(3))
+    station.GetInputPort("twist_command").FixValue(context, np.zeros(3))
     station.GetInputPort("mode").FixValue(context, Value(LegMode(posture="reptile")))
     simulator.AdvanceTo(0.2)
     plan = station.GetOutputPort("plan").Eval(context)
     assert plan.activity == "halt"
     assert "accepted: insect, mammal" in plan.status
-    assert station.GetOutputPort("q_xyt").Eval(context) == pytest.approx(np.zeros(3), abs=1e-4)
+    assert station.GetOutputPort("pose").Eval(context) == pytest.approx(np.zeros(3), abs=1e-4)
 
 
 def test_a_controller_may_leave_out_its_type() -> None:

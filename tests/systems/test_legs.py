@@ -1,6 +1,5 @@
 """The Systems of robots on legs: in diagrams built by hand, with ideal feedback and with a plant."""
 
-import inspect
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,10 +8,11 @@ from numpy.testing import assert_allclose
 from pydrake.common.value import Value
 from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlantConfig
 from pydrake.systems.analysis import Simulator
-from pydrake.systems.framework import Diagram, DiagramBuilder, LeafSystem
+from pydrake.systems.framework import Diagram, DiagramBuilder
 
 import robots
 import rollerbench as rb
+from ports import documented_ports, ports
 from rollerbench.kinematics.gaits import Gait, LegMode, LegPlanner
 from rollerbench.plant import RobotModel, ServoGains, add_ground
 from rollerbench.systems import (
@@ -32,12 +32,6 @@ PLANNER = LegPlanner(HEXAPOD)
 STEP = 0.002
 
 
-def ports(system: LeafSystem | Diagram) -> tuple[set[str], set[str]]:
-    """Names of input and of output ports."""
-    inputs = {system.get_input_port(i).get_name() for i in range(system.num_input_ports())}
-    return inputs, {system.get_output_port(i).get_name() for i in range(system.num_output_ports())}
-
-
 def test_ports_have_their_documented_names() -> None:
     start = PLANNER.start()
     model, _ = robot_in_a_plant(HEXAPOD, DiagramBuilder())
@@ -51,17 +45,7 @@ def test_ports_have_their_documented_names() -> None:
         LegWatch: LegWatch(PLANNER),
     }
     for kind, system in systems.items():
-        inputs, outputs = ports(system)
-        # Python 3.13 strips the indentation of docstrings, earlier ones do not: getdoc does for all.
-        before, after = inspect.getdoc(kind).split("Output ports:")
-        documented = [documented_ports(text) for text in (before.split("Input ports:")[1], after)]
-        assert [inputs, outputs] == documented, kind.__name__
-
-
-def documented_ports(text: str) -> set[str]:
-    """Names at the beginning of lines "name (size): what" or "name: what" of a docstring's section."""
-    lines = [line.strip() for line in text.splitlines() if line.startswith(" " * 4) and not line.startswith(" " * 5)]
-    return {line.split(":")[0].split(" (")[0] for line in lines if ":" in line}
+        assert ports(system) == documented_ports(kind), kind.__name__
 
 
 def robot_in_a_plant(robot: rb.Robot, builder: DiagramBuilder) -> tuple[RobotModel, object]:

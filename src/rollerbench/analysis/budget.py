@@ -22,6 +22,7 @@ SMALL = 1e-6
 """Errors below this are not shared out among parts [m, rad]."""
 
 MEANINGS = {
+    "feedback": "what feedback of the pose commanded besides the reference, against the other parts",
     "servo": "wheels that did not turn as commanded",
     "drivetrain": "gears, play and encoders between motors and wheels",
     "radius_scale": "injected: wheel radii",
@@ -86,10 +87,11 @@ class ErrorBudget:
 def error_budget(recording: Recording) -> ErrorBudget:
     """Splits a recording's pose error; needs nothing else, for the recording tells its robot.
 
-    The reference pose follows the commanded twist. Replacing, one after the other, the twist by that of the wheels'
-    measured speeds, of their true speeds, of the robot with its injected errors, of the contacts that it really had
-    (`WheelContact.drive_W`, `rolling_radius`), and of these with their slip leads step by step to the simulated pose.
-    The difference that each step makes at the end of the integration is a part; so the parts add up to the pose error.
+    The reference pose follows the commanded twist. Replacing, one after the other, the twist by that of the commanded
+    wheel speeds (only where feedback of the pose changes these), of the wheels' measured speeds, of their true speeds,
+    of the robot with its injected errors, of the contacts that it really had (`WheelContact.drive_W`,
+    `rolling_radius`), and of these with their slip leads step by step to the simulated pose. The difference that each
+    step makes at the end of the integration is a part; so the parts add up to the pose error.
 
     Raises:
         ResourceError: the recording lacks columns or the description of its robot.
@@ -101,6 +103,8 @@ def error_budget(recording: Recording) -> ErrorBudget:
     kinematics = WheelKinematics(robot, rollers=rollers)
     measured, speeds = (_driven(recording, robot, column)[1:] for column in ("measured", "speed"))
     angles = recording.wheels("swivel")[:-1]
+    if recording.metadata.get("feedback"):
+        stages["feedback"] = dt * _forward(kinematics, _driven(recording, robot, "command")[:-1], angles)
     stages["servo"] = dt * _forward(kinematics, measured, angles)
     if recording.metadata.get("drivetrain"):
         stages["drivetrain"] = dt * _forward(kinematics, speeds, angles)

@@ -129,6 +129,16 @@ class RobotModel:
             matrix[row, self.position_index(self.drive_joint(wheel))] = 1.0
         return matrix
 
+    def steering_state_matrix(self) -> NDArray[np.float64]:
+        """Matrix (2 n_steered, nq + nv) from the robot's state [q; v] to [angles; rates] of its steered wheels."""
+        steered, offset = self.robot.steered_wheels, self.plant.num_positions(self.model_instance)
+        matrix = np.zeros((2 * len(steered), self.plant.num_multibody_states(self.model_instance)))
+        for row, wheel in enumerate(steered):
+            joint = self.swivel_joint(wheel)
+            matrix[row, self.position_index(joint)] = 1.0
+            matrix[row + len(steered), offset + self.velocity_index(joint)] = 1.0
+        return matrix
+
     def leg_state_matrix(self) -> NDArray[np.float64]:
         """Matrix (2 n, nq + nv) from the robot's state [q; v] to [angles; rates] of its legs' n joints and wheels.
 

@@ -47,10 +47,9 @@ def simulate(scenario: Scenario, *, meshcat: Meshcat | None = None, progress: Pr
 
 def _stand_at_rest(simulator: Simulator, station: Station, scenario: Scenario) -> None:
     """Starts the robot at the origin, at rest, its weight on its wheels as a moment of standing still leaves it."""
-    trial = Station(scenario, command="external", visuals=False)
+    trial = Station(scenario, command="rest", visuals=False)
     waiting = Simulator(trial)
     follow_rollers(waiting)
-    trial.GetInputPort("v_xyw_B").FixValue(waiting.get_mutable_context(), np.zeros(3))
     model, plant_context = trial.parts.model, _plant_context(trial, waiting)
     model.set_pose(plant_context, (0.0, 0.0, 0.0))
     waiting.AdvanceTo(SETTLE_TIME)

@@ -14,11 +14,12 @@ from rollerbench.report.figures import run_figures
 from rollerbench.report.page import run_page
 from rollerbench.sdf import robot_to_sdf
 from rollerbench.simulation.log import Simulated
+from rollerbench.simulation.picture import diagram_svg
 from rollerbench.simulation.scenario import Scenario
 
 RUN_FILES = {
     *("scenario.yaml", "robot.yaml", "model.sdf", "recording.parquet", "summary.json"),
-    *("recording.html", "report.html", "figures", "cross_check.parquet"),
+    *("recording.html", "report.html", "figures", "cross_check.parquet", "diagram.svg"),
 }
 """Everything that a run writes, and so may replace."""
 
@@ -68,6 +69,7 @@ def write_folder(
             "summary.json": json.dumps(summary, indent=2, allow_nan=False) + "\n",
             "report.html": run_page(summary, figures, has_recording=page is not None),
             "recording.html": page,
+            "diagram.svg": diagram_svg(scenario) if scenario.recording.diagram else None,
         }
         for name, text in files.items():
             if text is not None:

@@ -26,7 +26,7 @@ def leg_recording(station: LegStation, scenario: Scenario, context: Context) -> 
     finite = np.isfinite(state).all(axis=1) & np.isfinite(data["motor_efforts"][: len(state)]).all(axis=1)
     end = len(time) if finite.all() else int(np.argmin(finite))
     time, state = time[:end], state[:end]
-    slow = logs["reference_q_xyt"].sample_times()
+    slow = logs["reference_pose"].sample_times()
 
     def resampled(values: Array) -> Array:
         return np.array([np.interp(time, slow, column) for column in values.T]).T.reshape(len(time), -1)
@@ -37,13 +37,13 @@ def leg_recording(station: LegStation, scenario: Scenario, context: Context) -> 
     rpy, p_WB = rotation.as_euler("xyz"), state[:, q + 4 : q + 7]
     w_WB, v_WB = state[:, v : v + 3], state[:, v + 3 : v + 6]
     yaw = np.unwrap(rpy[:, 2])
-    twist = resampled(data["reference_v_xyw_B"])
+    twist = resampled(data["reference_twist"])
     joints = state @ model.leg_state_matrix().T
     stance, desired = resampled(data["stance"]), resampled(data["desired"])
     reference = desired[:, [0, 1, 5]]
     planar = np.column_stack([rotate(-yaw, v_WB[:, :2]), w_WB[:, 2]])
-    if "odometry_q_xyt" in data:
-        odometry = data["odometry_q_xyt"].copy()
+    if "odometry" in data:
+        odometry = data["odometry"].copy()
         odometry[:, 2] = np.unwrap(odometry[:, 2])
         odometry = resampled(odometry)
     else:

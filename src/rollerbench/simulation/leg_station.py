@@ -45,7 +45,7 @@ class LegStationParts:
 EVERY_STEP = ("state", "motor_efforts", "contact_efforts")
 """Outputs that are recorded at every step of the plant, and ..."""
 
-EVERY_PERIOD = ("reference_q_xyt", "reference_v_xyw_B", "desired", "stance", "odometry_q_xyt")
+EVERY_PERIOD = ("reference_pose", "reference_twist", "desired", "stance", "odometry")
 """... those that change once in a period of control."""
 
 
@@ -77,15 +77,15 @@ class LegStation(Diagram):
     """A robot on legs on its ground, driven by a scenario's gait command.
 
     Input ports, only if the command comes from outside:
-        v_xyw_B (3): body twist command [m/s, m/s, rad/s].
+        twist_command (3): body twist [m/s, m/s, rad/s].
         body_offset (6): pose of the body from where its posture has it [m, rad]; 0 if not connected.
         mode: a `LegMode`; standing and walking in the first posture if not connected.
     Output ports:
         state (nq + nv): state of the robot's model instance, as the plant orders it.
-        q_xyt (3): pose of B in W, yaw in (-pi, pi] [m, m, rad].
-        v_xyw_B (3): twist in B turned upright [m/s, m/s, rad/s].
-        reference_q_xyt (3): where the accepted twists lead to [m, m, rad].
-        reference_v_xyw_B (3): the accepted twist, smoothed [m/s, m/s, rad/s].
+        pose (3): q_xyt, pose of B in W, yaw in (-pi, pi] [m, m, rad].
+        twist (3): v_xyw_B, twist in B turned upright [m/s, m/s, rad/s].
+        reference_pose (3): where the accepted twists lead to [m, m, rad].
+        reference_twist (3): the accepted twist, smoothed [m/s, m/s, rad/s].
         desired (6): pose of the body on its reference, x, y, z [m], roll, pitch, yaw [rad].
         stance (n_legs): 1 for feet that shall stand, 0 for those in the air.
         plan: the `LegPlan`.
@@ -94,8 +94,8 @@ class LegStation(Diagram):
         contact_efforts (nv): the contacts' forces on the velocities of the robot's model instance, as the plant orders
             them [N, N m].
         normal_forces (n_legs): loads of the feet [N].
-        slip_speeds (n_legs): how fast feet slide over the ground [m/s].
-        odometry_q_xyt (3): pose from the legs that stand [m, m, rad]; with a closed loop only.
+        slip (n_legs): how fast feet slide over the ground [m/s].
+        odometry (3): pose from the legs that stand [m, m, rad]; with a closed loop only.
         contact_results: Drake's ContactResults.
         query_object: Drake's QueryObject.
 
@@ -160,10 +160,10 @@ class LegStation(Diagram):
             wires.append((contacts.GetOutputPort("normal_forces"), planner.GetInputPort("foot_loads")))
         outputs = {
             "state": state,
-            "q_xyt": planar.GetOutputPort("q_xyt"),
-            "v_xyw_B": planar.GetOutputPort("v_xyw_B"),
-            "reference_q_xyt": planner.GetOutputPort("q_xyt"),
-            "reference_v_xyw_B": planner.GetOutputPort("v_xyw_B"),
+            "pose": planar.GetOutputPort("q_xyt"),
+            "twist": planar.GetOutputPort("v_xyw_B"),
+            "reference_pose": planner.GetOutputPort("q_xyt"),
+            "reference_twist": planner.GetOutputPort("v_xyw_B"),
             "desired": planner.GetOutputPort("desired"),
             "stance": planner.GetOutputPort("stance"),
             "plan": planner.GetOutputPort("plan"),
@@ -171,15 +171,15 @@ class LegStation(Diagram):
             "motor_efforts": servo.GetOutputPort("motor_efforts"),
             "contact_efforts": plant.get_generalized_contact_forces_output_port(model.model_instance),
             "normal_forces": contacts.GetOutputPort("normal_forces"),
-            "slip_speeds": contacts.GetOutputPort("slip_speeds"),
+            "slip": contacts.GetOutputPort("slip_speeds"),
             "contact_results": plant.get_contact_results_output_port(),
             "query_object": scene_graph.get_query_output_port(),
         }
         if control.closed_loop:
-            outputs["odometry_q_xyt"] = _close_loop(builder, planner, joints.get_output_port(), mode, control.period)
+            outputs["odometry"] = _close_loop(builder, planner, joints.get_output_port(), mode, control.period)
         if command == "external":
-            for name in ("v_xyw_B", "body_offset", "mode"):
-                builder.ExportInput(planner.GetInputPort(name), name)
+            for theirs, name in (("v_xyw_B", "twist_command"), ("body_offset", "body_offset"), ("mode", "mode")):
+                builder.ExportInput(planner.GetInputPort(theirs), name)
         else:
             source = builder.AddNamedSystem("command", CommandSource(course))
             wires += [

@@ -77,6 +77,7 @@ def provenance(scenario: Scenario, engine: str) -> dict[str, Any]:
         "robot_description": scenario.robot.model_dump(mode="json", exclude_none=True),
         "injected": {name: robot.model_dump(mode="json", exclude_none=True) for name, robot in injected.items()},
         "rollers": scenario.wheel_control.rollers,
+        "feedback": scenario.tracking is not None,
         "drivetrain": scenario.errors.drives(scenario.robot) is not None,
     }
 
@@ -106,9 +107,7 @@ def station_samples(station: Station, scenario: Scenario, context: Context) -> S
         command=data["wheel_speed_command"],
         measured=measured,
         effort=data["net_actuation"][:, driven],
-        odometry=odometry_poses(scenario, measured, motion, scenario.plant.time_step)
-        if scenario.motion.steers
-        else data["odometry_q_xyt"],
+        odometry=data["odometry"],
         first_roller={}
         if model.roller_window is None
         else {name: data["rollers"][:, offset] for name, offset in model.roller_window.offsets.items()},

@@ -10,7 +10,7 @@ from pydrake.geometry import Meshcat
 
 from rollerbench.errors import RollerbenchWarning, SimulationError
 from rollerbench.recording import Recording
-from rollerbench.simulation import drake_engine, leg_engine, mujoco_engine
+from rollerbench.simulation import drake_engine, leg_engine, mujoco_engine, picture
 from rollerbench.simulation.folder import check_folder, write_folder
 from rollerbench.simulation.log import Progress, Simulated
 from rollerbench.simulation.scenario import Scenario, load_scenario
@@ -67,6 +67,8 @@ def run(
     folder = Path(output if output is not None else Path("runs") / scenario.name) if save else None
     if folder is not None:
         check_folder(folder)
+        if scenario.recording.diagram:
+            picture.check()
     if scenario.engine != "drake":
         mujoco_engine.check(scenario)
     _warn_about_step(scenario)

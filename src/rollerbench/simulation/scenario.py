@@ -30,12 +30,15 @@ from rollerbench.simulation.imperfections import Errors
 from rollerbench.simulation.leg_command import GaitCommand
 from rollerbench.simulation.rehearsal import Rehearsal, rehearse
 from rollerbench.simulation.settings import (
+    Controller,
     Ground,
     LegControl,
     OpenLoop,
     PlantSettings,
+    PoseTracking,
     RecordingSettings,
     SimulatorSettings,
+    WheelControl,
     with_type,
 )
 
@@ -85,9 +88,9 @@ class Scenario(Part):
     robot: Annotated[Robot, BeforeValidator(_robot_from, json_schema_input_type=str | Robot)]
     duration: Positive
     command: Command
-    controller: Annotated[
-        OpenLoop | LegControl, BeforeValidator(with_type, json_schema_input_type=OpenLoop | LegControl)
-    ] = Field(default=OpenLoop(), discriminator="type")
+    controller: Annotated[Controller, BeforeValidator(with_type, json_schema_input_type=Controller)] = Field(
+        default=OpenLoop(), discriminator="type"
+    )
     plant: PlantSettings = PlantSettings()
     ground: Ground = Ground()
     errors: Errors = Errors()
@@ -102,7 +105,7 @@ class Scenario(Part):
         problems = list(self.command.problems(self.robot, self.duration, self.plant.time_step))
         problems += self.errors.problems(self.robot)
         problems += _leg_problems(self) if self.robot.legs else _wheel_problems(self)
-        if isinstance(self.controller, OpenLoop) and self.controller.pid is not None and self.controller.servo != "pid":
+        if self.wheel_control.pid is not None and self.wheel_control.servo != "pid":
             problems.append(Problem(("controller", "pid"), "gains without their controller; accepted: with servo: pid"))
         if isinstance(self.command, WheelEffortsCommand) and self.ground.slope_deg:
             message = "torques have a reference on level ground only; accepted: 0, or another command"
@@ -119,9 +122,14 @@ class Scenario(Part):
         return self
 
     @property
-    def wheel_control(self) -> OpenLoop:
+    def wheel_control(self) -> WheelControl:
         """The controller of a robot on wheels."""
-        return self.controller if isinstance(self.controller, OpenLoop) else OpenLoop()
+        return self.controller if isinstance(self.controller, WheelControl) else OpenLoop()
+
+    @property
+    def tracking(self) -> PoseTracking | None:
+        """The feedback of the pose of a robot on wheels, if there is any."""
+        return self.controller if isinstance(self.controller, PoseTracking) else None
 
     @property
     def leg_control(self) -> LegControl:
@@ -230,21 +238,42 @@ def _wheel_problems(scenario: Scenario) -> Iterator[Problem]:
     if not scenario.robot.driven_wheels:
         yield Problem(("robot",), "no wheel is driven; accepted: a robot with driven: true somewhere")
     if isinstance(scenario.controller, LegControl):
-        yield Problem(("controller", "type"), "the robot has no legs; accepted: open_loop", scenario.controller.type)
+        message = "the robot has no legs; accepted: open_loop, pose_tracking"
+        yield Problem(("controller", "type"), message, scenario.controller.type)
+    if scenario.tracking is not None:
+        yield from _tracking_problems(scenario, scenario.tracking)
     if scenario.ground.steps:
         yield Problem(("ground", "steps"), "for robots on legs only; accepted: errors.ground_bumps for wheels")
+
+
+def _tracking_problems(scenario: Scenario, tracking: PoseTracking) -> Iterator[Problem]:
+    yield from _period_problems(scenario, tracking.period)
+    if isinstance(scenario.command, WheelEffortsCommand):
+        message = "torques are given, so none are left to feedback; accepted: twist, wheel_speeds, waypoints, path"
+        yield Problem(("command", "type"), message, scenario.command.type)
+    if scenario.engine != "drake":
+        message = "feedback of the pose is simulated by Drake only; accepted: drake, or controller: open_loop"
+        yield Problem(("engine",), message, scenario.engine)
+    if tracking.max_wheel_jerk is not None and tracking.max_wheel_acceleration is None:
+        yield Problem(
+            ("controller", "max_wheel_jerk"), "accepted: with max_wheel_acceleration", tracking.max_wheel_jerk
+        )
+
+
+def _period_problems(scenario: Scenario, period: float) -> Iterator[Problem]:
+    step = scenario.plant.time_step
+    if abs(period / step - round(period / step)) > 1e-6 or period < step * (1 - 1e-9):
+        message = f"accepted: a multiple of the plant's step, {step:g}"
+        yield Problem(("controller", "period"), message, period)
 
 
 def _leg_problems(scenario: Scenario) -> Iterator[Problem]:
     name, control = scenario.robot.name, scenario.controller
     if not isinstance(scenario.command, GaitCommand):
         yield Problem(("command", "type"), f"{name} stands on legs; accepted: gait", scenario.command.type)
-    if isinstance(control, OpenLoop) and control != OpenLoop():
+    if isinstance(control, WheelControl) and control != OpenLoop():
         yield Problem(("controller", "type"), f"{name} stands on legs; accepted: legs", control.type)
-    period, step = scenario.leg_control.period, scenario.plant.time_step
-    if abs(period / step - round(period / step)) > 1e-6 or period < step * (1 - 1e-9):
-        message = f"accepted: a multiple of the plant's step, {step:g}"
-        yield Problem(("controller", "period"), message, period)
+    yield from _period_problems(scenario, scenario.leg_control.period)
     if scenario.engine != "drake":
         yield Problem(
             ("engine",), f"{name} stands on legs, which only Drake simulates; accepted: drake", scenario.engine

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from pydantic import BeforeValidator, ConfigDict, Field, model_validator
 
 from rollerbench.description.part import Flag, NonNegative, Number, Part, Positive
+from rollerbench.kinematics.tracking import DEFAULT_GAINS, TrackingGains
 from rollerbench.sdf.servo import DRIVE_TIME_CONSTANT
 from rollerbench.sdf.window import DEFAULT_SIZE
 
@@ -27,8 +28,8 @@ class PidSettings(Part):
     kd: NonNegative = 0.0
 
 
-class OpenLoop(Part):
-    """Wheel speeds from the command by inverse kinematics, without feedback of the pose.
+class WheelControl(Part):
+    """What every controller of wheels has: how motors follow their speeds, and which equations it believes.
 
     Attributes:
         servo: What makes the wheels follow: "implicit", the plant's own stiff servo, or "pid", explicit torques.
@@ -37,11 +38,53 @@ class OpenLoop(Part):
         rollers: "textbook", or "finite" for equations that count the rollers of Mecanum wheels (`WheelKinematics`).
     """
 
-    type: Literal["open_loop"] = "open_loop"
     servo: Literal["implicit", "pid"] = "implicit"
     pid: PidSettings | None = None
     servo_time_constant: Positive = DRIVE_TIME_CONSTANT
     rollers: Literal["textbook", "finite"] = "textbook"
+
+
+class OpenLoop(WheelControl):
+    """Wheel speeds from the command by inverse kinematics, without feedback of the pose."""
+
+    type: Literal["open_loop"] = "open_loop"
+
+
+class PoseTracking(WheelControl):
+    """Feedback that brings the robot back to the pose where its command has it (`rollerbench.systems.PoseTracker`).
+
+    Attributes:
+        feedback: Where the pose comes from: "pose", from a perfect measurement; "odometry", from the wheels alone.
+        position: Rate at which errors of position decay [1/s].
+        heading: Rate at which errors of heading decay [1/s].
+        lateral: Inverse of the distance on which a robot with fixed tyres comes back to its path [1/m].
+        period: Period of control [s], a multiple of the plant's step.
+        max_wheel_acceleration: Limit of the driven wheels' accelerations [rad/s2]; None for no limit.
+        max_wheel_jerk: Limit of their jerks [rad/s3]; None for no limit.
+    """
+
+    type: Literal["pose_tracking"] = "pose_tracking"
+    feedback: Literal["pose", "odometry"] = "pose"
+    position: NonNegative = DEFAULT_GAINS.position
+    heading: NonNegative = DEFAULT_GAINS.heading
+    lateral: NonNegative = DEFAULT_GAINS.lateral
+    period: Annotated[Positive, Field(ge=1e-4, le=0.1)] = 0.01
+    max_wheel_acceleration: Positive | None = None
+    max_wheel_jerk: Positive | None = None
+
+    @model_validator(mode="after")
+    def _is_stable(self) -> Self:
+        for name in ("position", "heading"):
+            if getattr(self, name) * self.period > 0.5:
+                raise ValueError(
+                    f"{name} = {getattr(self, name):g}: accepted: up to {0.5 / self.period:g}, 0.5 / period"
+                )
+        return self
+
+    @property
+    def gains(self) -> TrackingGains:
+        """Gains of the tracking law."""
+        return TrackingGains(position=self.position, heading=self.heading, lateral=self.lateral)
 
 
 class LegControl(Part):
@@ -57,12 +100,15 @@ class LegControl(Part):
     period: Annotated[Positive, Field(ge=1e-4, le=0.1)] = 0.02
 
 
+Controller = OpenLoop | PoseTracking | LegControl
+
+
 def with_type(value: Any) -> Any:
-    """A controller that leaves out its type: open_loop, or legs if it has fields of legs only."""
+    """A controller that leaves out its type: the one that has most of its fields, open_loop before the others."""
     if not isinstance(value, Mapping) or "type" in value:
         return value
-    of_legs = value.keys() & (LegControl.model_fields.keys() - OpenLoop.model_fields.keys())
-    return {"type": "legs" if of_legs else "open_loop", **value}
+    kinds: dict[str, type[Part]] = {"open_loop": OpenLoop, "legs": LegControl, "pose_tracking": PoseTracking}
+    return {"type": max(kinds, key=lambda kind: len(value.keys() & kinds[kind].model_fields.keys())), **value}
 
 
 UNFIT = {
@@ -152,7 +198,9 @@ class RecordingSettings(Part):
     Attributes:
         html: Whether to write the self-contained Meshcat page recording.html.
         frames_per_second: Frames of that page [1/s].
+        diagram: Whether to draw the simulated diagram as diagram.svg.
     """
 
     html: Flag = True
     frames_per_second: Annotated[Positive, Field(le=200)] = 30.0
+    diagram: Flag = False

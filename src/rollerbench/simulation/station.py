@@ -1,40 +1,25 @@
 """The diagram that a scenario simulates: command, kinematics, servo, plant."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from pydrake.geometry import Meshcat, SceneGraph
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Diagram, DiagramBuilder, OutputPort
-from pydrake.systems.primitives import (
-    ConstantVectorSource,
-    LogVectorOutput,
-    MatrixGain,
-    Multiplexer,
-    TrajectorySource,
-    VectorLogSink,
-)
-from pydrake.trajectories import PiecewisePolynomial
+from pydrake.systems.primitives import LogVectorOutput, MatrixGain, VectorLogSink
 
-from rollerbench.kinematics.profile import Profile
-from rollerbench.plant import RobotModel, ServoGains, add_ground, add_robot, servo_gains
-from rollerbench.simulation.commands import WheelEffortsCommand, WheelSpeedsCommand
+from rollerbench.plant import RobotModel, add_ground, add_robot
 from rollerbench.simulation.drake_config import add_plant
 from rollerbench.simulation.leg_station import LegStation
+from rollerbench.simulation.motors import Motors, add_motors, add_roll_resistance, servo_gains_of
 from rollerbench.simulation.scenario import Scenario, load_scenario
-from rollerbench.systems import (
-    Drivetrain,
-    InverseKinematics,
-    Odometry,
-    PidGains,
-    PlanarState,
-    RollResistance,
-    SlipMonitor,
-    WheelSpeedController,
-)
+from rollerbench.simulation.wheel_command import CommandFrom, add_command, drive_of, steers
+from rollerbench.systems import Odometry, PlanarState, SlipMonitor, SteeredOdometry
 from rollerbench.visualization.scene import add_bump_visuals, add_ground_visual, add_meshcat
+
+LOGGED = ("state", "wheel_speed_command", "wheel_speeds", "net_actuation", "odometry", "rollers")
+"""Outputs that a run records."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,7 +35,7 @@ class StationParts:
 
     model: RobotModel
     scene_graph: SceneGraph
-    odometry: Odometry
+    odometry: Odometry | SteeredOdometry
     logs: dict[str, VectorLogSink]
 
 
@@ -58,20 +43,31 @@ class Station(Diagram):
     """A robot on its ground, driven by a scenario's command.
 
     Where rollers are windowed, as they are by default, call `follow_rollers(simulator)` before the simulation. With
-    all rollers, and without slip and rolling resistance, all systems are Drake's own, and ToAutoDiffXd() converts it.
+    all rollers, and without slip, rolling resistance and steering on the way, all systems are Drake's own, and
+    ToAutoDiffXd() converts it.
 
-    Input ports:
-        v_xyw_B (3): body twist command [m/s, m/s, rad/s]; only if the command comes from outside.
+    Input ports, only if the command comes from outside, and then the one that fits the scenario:
+        twist_command (3): body twist [m/s, m/s, rad/s]; where the scenario commands a twist, waypoints or a path.
+        wheel_command (n_driven): speeds of the driven wheels [rad/s]; where it commands wheel speeds.
+        effort_command (n_driven): torques of the driven wheels [N m]; where it commands wheel efforts.
+        reference_pose (3), reference_twist (3): where B should be in W [m, m, rad], and its twist there in its own
+            axes [m/s, m/s, rad/s]; in place of these, where the controller tracks poses.
     Output ports:
+        pose (3): q_xyt, pose of B in W, yaw in (-pi, pi] [m, m, rad].
+        twist (3): v_xyw_B, twist in B turned upright [m/s, m/s, rad/s].
+        odometry (3): pose from the measured wheel speeds, and from the steering angles of wheels that steer; its yaw
+            counts full turns [m, m, rad].
+        wheel_state (2 n_driven): true angles of the driven wheels, then their speeds [rad, rad/s].
+        wheel_speeds (n_driven): what their encoders measure [rad/s].
+        wheel_speed_command (n_driven): what they are told [rad/s].
+        steering_state (2 n_steered): angles of the steered wheels from heading_deg, then their rates [rad, rad/s];
+            only if there are such wheels.
+        net_actuation (n_actuators): torques of the motors, as the plant orders them [N m].
+        slip (n_wheels): how fast wheels slide over the ground [m/s] (`SlipMonitor`).
+        normal_forces (n_wheels): loads of the wheels [N].
         state (nq + nv): state of the robot's model instance, as the plant orders it.
-        q_xyt (3): pose of B in W, yaw in (-pi, pi] [m, m, rad].
-        v_xyw_B (3): twist in B turned upright [m/s, m/s, rad/s].
-        wheel_speed_command (n_driven): commanded wheel speeds [rad/s].
-        wheel_speeds (n_driven): wheel speeds that the encoders measure [rad/s].
-        net_actuation (n_actuators): torques of the servos [N m].
-        slip_speeds (n_wheels): how fast wheels slide over the ground [m/s] (`SlipMonitor`); only if asked for.
-        normal_forces (n_wheels): loads of the wheels [N]; only if asked for.
-        odometry_q_xyt (3): pose from these measured wheel speeds [m, m, rad].
+        reference_pose (3), reference_twist (3), twist_command (3): what the controller tracks, and what it commands;
+            only where it tracks poses.
         rollers (...): state of the `RollerWindow`; only if rollers are windowed.
         contact_results: Drake's ContactResults.
         query_object: Drake's QueryObject.
@@ -86,33 +82,34 @@ class Station(Diagram):
         self,
         scenario: Scenario,
         *,
-        command: Literal["scenario", "external"] = "scenario",
+        command: CommandFrom = "scenario",
         meshcat: Meshcat | None = None,
         log: bool = False,
         visuals: bool = True,
-        slip: bool = False,
+        slip: bool = True,
     ) -> None:
         """Builds the diagram of a scenario.
 
         Args:
             scenario: What to simulate.
-            command: "scenario" drives the robot as the scenario says; "external" exports the input v_xyw_B.
+            command: "scenario" drives the robot as the scenario says; "external" exports inputs for that; "rest" holds
+                the wheels.
             meshcat: Where to show the robot.
             log: Whether to record outputs (see `StationParts.logs`).
             visuals: Whether the robot shall be seen, in the meshcat or by what is connected to query_object.
-            slip: Whether to export slip_speeds and normal_forces.
+            slip: Whether to export slip and normal_forces, which no AutoDiffXd can tell.
 
         Raises:
             DescriptionError: Drake refuses a setting of the plant.
             InfeasibleTwist: the command would make a tyre skid.
         """
         super().__init__()
-        builder = DiagramBuilder()
+        builder, drive = DiagramBuilder(), drive_of(scenario, command)
         plant, scene_graph = add_plant(builder, scenario)
         model = add_robot(
             plant,
             scenario.simulated_robot,
-            gains=_gains(scenario, external=command == "external"),
+            gains=servo_gains_of(scenario, drive),
             roller_model=scenario.plant.roller_model,
             builder=builder,
             window_size=scenario.window_size,
@@ -121,39 +118,20 @@ class Station(Diagram):
         _add_ground(plant, scenario, drawn=meshcat is not None)
         plant.Finalize()
 
-        command_port = _add_command(builder, scenario, external=command == "external")
-        measured_port = _add_motors(builder, scenario, model, command_port, external=command == "external")
-        _add_roll_resistance(builder, scenario, model)
-        outputs = {
-            "state": plant.get_state_output_port(model.model_instance),
-            "wheel_speed_command": command_port,
-            "wheel_speeds": measured_port,
-            "net_actuation": plant.get_net_actuation_output_port(model.model_instance),
-            "contact_results": plant.get_contact_results_output_port(),
-            "query_object": scene_graph.get_query_output_port(),
-        }
-        if model.roller_window is not None:
-            outputs["rollers"] = model.roller_window.GetOutputPort("rollers")
-        if slip:
-            monitor = builder.AddNamedSystem("slip_monitor", SlipMonitor(model))
-            builder.Connect(outputs["contact_results"], monitor.GetInputPort("contact_results"))
-            outputs |= {name: monitor.GetOutputPort(name) for name in ("slip_speeds", "normal_forces")}
-        body = builder.AddNamedSystem("body_state", MatrixGain(model.body_state_matrix()))
-        builder.Connect(outputs["state"], body.get_input_port())
-        planar = builder.AddNamedSystem("planar_state", PlanarState())
-        builder.Connect(body.get_output_port(), planar.GetInputPort("state"))
-        outputs |= {name: planar.GetOutputPort(name) for name in ("q_xyt", "v_xyw_B")}
-        odometry = builder.AddNamedSystem("odometry", Odometry(scenario.motion.kinematics, scenario.plant.time_step))
-        builder.Connect(outputs["wheel_speeds"], odometry.GetInputPort("wheel_speeds"))
-        outputs["odometry_q_xyt"] = odometry.GetOutputPort("q_xyt")
+        outputs = _add_sensors(builder, scene_graph, model, slip=slip)
+        motors = add_motors(builder, scenario, model, drive)
+        odometry = _add_odometry(builder, scenario, outputs, motors, steered=steers(scenario, command))
+        outputs |= {"wheel_speeds": motors.measured, "odometry": odometry.GetOutputPort("q_xyt")}
+        outputs |= add_command(builder, scenario, motors, outputs, command)
+        add_roll_resistance(builder, scenario, model)
         for name, port in outputs.items():
             builder.ExportOutput(port, name)
 
         logs = {}
         if log:
-            recorded = ("state", "wheel_speed_command", "wheel_speeds", "net_actuation", "odometry_q_xyt", "rollers")
-            for name in outputs.keys() & set(recorded):
-                logs[name] = LogVectorOutput(outputs[name], builder, publish_period=scenario.plant.time_step)
+            for name in LOGGED:
+                if name in outputs:
+                    logs[name] = LogVectorOutput(outputs[name], builder, publish_period=scenario.plant.time_step)
         if meshcat is not None:
             add_meshcat(builder, scene_graph, meshcat, scenario.recording.frames_per_second)
         builder.BuildInto(self)
@@ -163,18 +141,74 @@ class Station(Diagram):
 def build_station(
     scenario: Scenario | str | Path,
     *,
-    command: Literal["scenario", "external"] = "scenario",
+    command: CommandFrom = "scenario",
     meshcat: Meshcat | None = None,
-    slip: bool = False,
+    slip: bool = True,
 ) -> Station | LegStation:
-    """The diagram of a scenario, to simulate or to compose with other systems.
+    """The diagram of a scenario, to simulate or to compose with other systems: a `Station`, or on legs a `LegStation`.
 
-    See `Station`; of a robot on legs `LegStation`, which always exports slip_speeds and normal_forces.
+    Args:
+        scenario: Scenario, name of a shipped one, or path to a scenario.yaml.
+        command: "scenario" drives the robot as the scenario says; "external" exports inputs for that; "rest", for
+            robots on wheels, holds these.
+        meshcat: Where to show the robot.
+        slip: Whether robots on wheels export slip and normal_forces, which no AutoDiffXd can tell.
     """
     loaded = load_scenario(scenario)
     if loaded.robot.legs:
-        return LegStation(loaded, command=command, meshcat=meshcat)
+        return LegStation(loaded, command="scenario" if command == "scenario" else "external", meshcat=meshcat)
     return Station(loaded, command=command, meshcat=meshcat, slip=slip)
+
+
+def _add_sensors(
+    builder: DiagramBuilder, scene_graph: SceneGraph, model: RobotModel, *, slip: bool
+) -> dict[str, OutputPort]:
+    """Output ports of what the plant tells."""
+    plant = model.plant
+    state = plant.get_state_output_port(model.model_instance)
+    body = builder.AddNamedSystem("body_state", MatrixGain(model.body_state_matrix()))
+    planar = builder.AddNamedSystem("planar_state", PlanarState())
+    builder.Connect(state, body.get_input_port())
+    builder.Connect(body.get_output_port(), planar.GetInputPort("state"))
+    outputs = {
+        "pose": planar.GetOutputPort("q_xyt"),
+        "twist": planar.GetOutputPort("v_xyw_B"),
+        "state": state,
+        "net_actuation": plant.get_net_actuation_output_port(model.model_instance),
+        "contact_results": plant.get_contact_results_output_port(),
+        "query_object": scene_graph.get_query_output_port(),
+    }
+    selected = {"wheel_state": np.vstack([model.wheel_angle_matrix(), model.wheel_speed_matrix()])}
+    if model.robot.steered_wheels:
+        selected["steering_state"] = model.steering_state_matrix()
+    for name, matrix in selected.items():
+        gain = builder.AddNamedSystem(name, MatrixGain(matrix))
+        builder.Connect(state, gain.get_input_port())
+        outputs[name] = gain.get_output_port()
+    if slip:
+        monitor = builder.AddNamedSystem("slip_monitor", SlipMonitor(model))
+        builder.Connect(outputs["contact_results"], monitor.GetInputPort("contact_results"))
+        outputs |= {"slip": monitor.GetOutputPort("slip_speeds")}
+        outputs |= {"normal_forces": monitor.GetOutputPort("normal_forces")}
+    if model.roller_window is not None:
+        outputs["rollers"] = model.roller_window.GetOutputPort("rollers")
+    return outputs
+
+
+def _add_odometry(
+    builder: DiagramBuilder, scenario: Scenario, outputs: dict[str, OutputPort], motors: Motors, *, steered: bool
+) -> Odometry | SteeredOdometry:
+    kinematics, step = scenario.motion.kinematics, scenario.plant.time_step
+    if not steered:
+        odometry = builder.AddNamedSystem("odometry", Odometry(kinematics, step))
+    else:
+        odometry = builder.AddNamedSystem("odometry", SteeredOdometry(kinematics, step))
+        count = len(scenario.robot.steered_wheels)
+        angles = builder.AddNamedSystem("steering_angles", MatrixGain(np.eye(count, 2 * count)))
+        builder.Connect(outputs["steering_state"], angles.get_input_port())
+        builder.Connect(angles.get_output_port(), odometry.GetInputPort("steering_angles"))
+    builder.Connect(motors.measured, odometry.GetInputPort("wheel_speeds"))
+    return odometry
 
 
 def _add_ground(plant: MultibodyPlant, scenario: Scenario, *, drawn: bool) -> None:
@@ -184,118 +218,3 @@ def _add_ground(plant: MultibodyPlant, scenario: Scenario, *, drawn: bool) -> No
         add_ground_visual(plant, scenario.simulated_robot)
         if bumps is not None and carrier is not None:
             add_bump_visuals(plant, carrier, bumps)
-
-
-def _gains(scenario: Scenario, *, external: bool) -> ServoGains:
-    """Gains of the plant's servos: none for wheels that are driven by torques."""
-    gains = servo_gains(scenario.robot, time_constant=scenario.wheel_control.servo_time_constant)
-    return replace(gains, drive_damping={}) if _by_torques(scenario, external=external) else gains
-
-
-def _by_torques(scenario: Scenario, *, external: bool) -> bool:
-    return scenario.wheel_control.servo == "pid" or (not external and scenario.motion.wheel_efforts is not None)
-
-
-def _add_command(builder: DiagramBuilder, scenario: Scenario, *, external: bool) -> OutputPort:
-    """The output port of the commanded wheel speeds; where torques are commanded, of those that they should lead to."""
-    motion = scenario.motion
-    if not external and (motion.steers or isinstance(scenario.command, WheelSpeedsCommand | WheelEffortsCommand)):
-        return builder.AddNamedSystem("wheel_speed_command", _source(motion.wheel_speeds)).get_output_port()
-    kinematics = builder.AddNamedSystem("inverse_kinematics", InverseKinematics(motion.kinematics))
-    if external:
-        builder.ExportInput(kinematics.GetInputPort("v_xyw_B"), "v_xyw_B")
-    else:
-        twist = builder.AddNamedSystem("twist_command", _source(motion.twist))
-        builder.Connect(twist.get_output_port(), kinematics.GetInputPort("v_xyw_B"))
-    return kinematics.GetOutputPort("wheel_speeds")
-
-
-def _add_motors(
-    builder: DiagramBuilder, scenario: Scenario, model: RobotModel, command_port: OutputPort, *, external: bool
-) -> OutputPort:
-    """Connects what drives and steers the wheels; returns the output port of the wheel speeds that are measured."""
-    servo_port, measured_port = _add_drivetrain(builder, scenario, model, command_port)
-    if not _by_torques(scenario, external=external):
-        _connect_servo(builder, scenario, model, servo_port, external=external)
-        return measured_port
-    if model.robot.steered_wheels:
-        still = ConstantVectorSource(np.zeros(len(model.robot.driven_wheels)))
-        _connect_servo(
-            builder, scenario, model, builder.AddNamedSystem("no_servo", still).get_output_port(), external=external
-        )
-    if scenario.motion.wheel_efforts is not None and not external:
-        efforts = builder.AddNamedSystem("wheel_effort_command", _source(scenario.motion.wheel_efforts))
-        effort_port = efforts.get_output_port()
-    else:
-        settings = scenario.wheel_control.pid
-        gains = None
-        if settings is not None:
-            gains = [PidGains(kp=settings.kp, ki=settings.ki, kd=settings.kd)] * len(scenario.robot.driven_wheels)
-        pid = WheelSpeedController(scenario.robot, scenario.plant.time_step, gains)
-        controller = builder.AddNamedSystem("wheel_speed_controller", pid)
-        builder.Connect(servo_port, controller.GetInputPort("wheel_speed_command"))
-        builder.Connect(measured_port, controller.GetInputPort("wheel_speeds"))
-        effort_port = controller.GetOutputPort("wheel_efforts")
-    motors = builder.AddNamedSystem("motors", MatrixGain(model.actuation_matrix()))
-    builder.Connect(effort_port, motors.get_input_port())
-    builder.Connect(motors.get_output_port(), model.plant.get_actuation_input_port(model.model_instance))
-    return measured_port
-
-
-def _add_roll_resistance(builder: DiagramBuilder, scenario: Scenario, model: RobotModel) -> None:
-    if not scenario.ground.roll_resistance:
-        return
-    plant = model.plant
-    velocities = np.hstack([np.zeros((plant.num_velocities(), plant.num_positions())), np.eye(plant.num_velocities())])
-    selector = builder.AddNamedSystem("velocities", MatrixGain(velocities))
-    builder.Connect(plant.get_state_output_port(), selector.get_input_port())
-    drag = builder.AddNamedSystem("roll_resistance", RollResistance(model, scenario.ground.roll_resistance))
-    builder.Connect(plant.get_contact_results_output_port(), drag.GetInputPort("contact_results"))
-    builder.Connect(plant.get_body_poses_output_port(), drag.GetInputPort("body_poses"))
-    builder.Connect(selector.get_output_port(), drag.GetInputPort("velocities"))
-    builder.Connect(drag.GetOutputPort("generalized_force"), plant.get_applied_generalized_force_input_port())
-
-
-def _add_drivetrain(
-    builder: DiagramBuilder, scenario: Scenario, model: RobotModel, command_port: OutputPort
-) -> tuple[OutputPort, OutputPort]:
-    """The output ports of the wheel speeds for the servos, and of those that are measured."""
-    state = model.plant.get_state_output_port(model.model_instance)
-    speeds = builder.AddNamedSystem("wheel_speed_sensor", MatrixGain(model.wheel_speed_matrix()))
-    builder.Connect(state, speeds.get_input_port())
-    drives = scenario.errors.drives(scenario.robot)
-    if drives is None:
-        return command_port, speeds.get_output_port()
-    angles = builder.AddNamedSystem("wheel_angle_sensor", MatrixGain(model.wheel_angle_matrix()))
-    builder.Connect(state, angles.get_input_port())
-    drivetrain = builder.AddNamedSystem("drivetrain", Drivetrain(drives, scenario.plant.time_step))
-    builder.Connect(command_port, drivetrain.GetInputPort("wheel_speed_command"))
-    builder.Connect(angles.get_output_port(), drivetrain.GetInputPort("wheel_angles"))
-    return drivetrain.GetOutputPort("servo_wheel_speeds"), drivetrain.GetOutputPort("measured_wheel_speeds")
-
-
-def _connect_servo(
-    builder: DiagramBuilder, scenario: Scenario, model: RobotModel, command_port: OutputPort, *, external: bool
-) -> None:
-    plant = model.plant
-    if not model.actuators:
-        return
-    servo = builder.AddNamedSystem("servo_command", MatrixGain(model.desired_state_matrix()))
-    builder.Connect(servo.get_output_port(), plant.get_desired_state_input_port(model.model_instance))
-    if not scenario.robot.steered_wheels:
-        builder.Connect(command_port, servo.get_input_port())
-        return
-    angles = scenario.motion.steering_angles
-    held = ConstantVectorSource(np.concatenate([angles(0.0), np.zeros(angles.values.shape[1])]))
-    source = held if external else _source(angles, with_rates=True)
-    steering = builder.AddNamedSystem("steering_command", source).get_output_port()
-    both = builder.AddNamedSystem("motor_commands", Multiplexer([command_port.size(), steering.size()]))
-    builder.Connect(command_port, both.get_input_port(0))
-    builder.Connect(steering, both.get_input_port(1))
-    builder.Connect(both.get_output_port(), servo.get_input_port())
-
-
-def _source(profile: Profile, *, with_rates: bool = False) -> TrajectorySource:
-    """Values of a profile over time, followed by their time derivatives if asked for."""
-    trajectory = PiecewisePolynomial.CubicHermite(profile.breaks, profile.values.T, profile.slopes.T)
-    return TrajectorySource(trajectory, output_derivative_order=int(with_rates), zero_derivatives_beyond_limits=True)

@@ -180,12 +180,12 @@ def _gives_way(task: _Task, robot: Robot, acceleration: float) -> bool:
     }
     # Twice as long, so that the push has not begun to end.
     scenario = _scenario(task, robot, 2 * duration, command, time_step=duration / SLIP_STEPS)
-    station = Station(scenario, visuals=False, slip=True)
+    station = Station(scenario, visuals=False)
     simulator = Simulator(station)
     follow_rollers(simulator)
     simulator.AdvanceTo(duration)
     context = simulator.get_context()
-    slip, loads = (station.GetOutputPort(name).Eval(context) for name in ("slip_speeds", "normal_forces"))
+    slip, loads = (station.GetOutputPort(name).Eval(context) for name in ("slip", "normal_forces"))
     carrying = loads[supporting_wheels(robot)]
     return bool(np.max(slip) > SLIPPING * acceleration * duration or np.min(carrying) < LIFTED * np.mean(carrying))
 

@@ -5,7 +5,9 @@ from rollerbench.systems.drivetrain import Drivetrain
 from rollerbench.systems.kinematics import ForwardKinematics, InverseKinematics, Odometry, PlanarState
 from rollerbench.systems.leg_servo import LegServo, damp_joints, unlimited
 from rollerbench.systems.legs import GaitPlanner, LegInverseKinematics, LegTracker
+from rollerbench.systems.pose_tracker import PoseTracker, ReferenceSource
 from rollerbench.systems.stance import BodyPoseController, LegWatch, StanceOdometry
+from rollerbench.systems.steering import SteeredOdometry, SteeringKinematics
 from rollerbench.systems.wheel_speed_controller import PidGains, WheelSpeedController, wheel_speed_gains
 
 __all__ = [
@@ -21,9 +23,13 @@ __all__ = [
     "Odometry",
     "PidGains",
     "PlanarState",
+    "PoseTracker",
+    "ReferenceSource",
     "RollResistance",
     "SlipMonitor",
     "StanceOdometry",
+    "SteeredOdometry",
+    "SteeringKinematics",
     "WheelSpeedController",
     "damp_joints",
     "unlimited",

@@ -1,0 +1,141 @@
+"""Reference motions, and the feedback that keeps a base on them, as Drake Systems."""
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydrake.symbolic import Expression, Variable, cos, sin
+from pydrake.systems.framework import Diagram, DiagramBuilder
+from pydrake.systems.primitives import Demultiplexer, Multiplexer, SymbolicVectorSystem, TrajectorySource
+from pydrake.trajectories import PiecewisePolynomial, Trajectory
+
+from rollerbench.description import Robot
+from rollerbench.errors import KinematicsError
+from rollerbench.kinematics import WheelKinematics, odometry
+from rollerbench.kinematics.profile import Profile, reference_poses
+from rollerbench.kinematics.tracking import DEFAULT_GAINS, TrackingGains, tracking_law
+
+SAMPLE_TIME = 0.01
+"""Largest spacing of the samples between which reference poses are cubics [s]."""
+
+
+class ReferenceSource(Diagram):
+    """Where a robot should be over time, and how it should move there.
+
+    Output ports:
+        q_xyt (3): pose of B in W; the yaw counts full turns [m, m, rad].
+        v_xyw_B (3): twist in B [m/s, m/s, rad/s].
+
+    Before its start and after its end both keep their values, so let a reference start and end at rest.
+    """
+
+    def __init__(self, reference: Profile | Trajectory, start: ArrayLike = (0.0, 0.0, 0.0)) -> None:
+        """Builds the diagram.
+
+        Args:
+            reference: A body twist over time, such as `rollerbench.paths` make them; or a Drake trajectory of poses
+                (3 rows: x, y, yaw [m, m, rad]) that can be differentiated.
+            start: Pose (3,) at the start of a body twist [m, m, rad].
+
+        Raises:
+            KinematicsError: the reference has not 3 components, or start is malformed.
+        """
+        super().__init__()
+        size = reference.values.shape[1] if isinstance(reference, Profile) else reference.rows() * reference.cols()
+        if size != 3:
+            raise KinematicsError(
+                f"reference has {size} components: accepted: 3 (a twist over time, or poses x, y, yaw)"
+            )
+        builder = DiagramBuilder()
+        if isinstance(reference, Profile):
+            source = builder.AddNamedSystem("trajectory", _twist_source(reference, start))
+            values = source.get_output_port()
+        else:
+            source = TrajectorySource(reference, output_derivative_order=1, zero_derivatives_beyond_limits=True)
+            builder.AddNamedSystem("trajectory", source)
+            turned = builder.AddNamedSystem("into_the_body", _into_the_body())
+            builder.Connect(source.get_output_port(), turned.get_input_port())
+            values = turned.get_output_port()
+        parts = builder.AddNamedSystem("parts", Demultiplexer([3, 3]))
+        builder.Connect(values, parts.get_input_port())
+        builder.ExportOutput(parts.get_output_port(0), "q_xyt")
+        builder.ExportOutput(parts.get_output_port(1), "v_xyw_B")
+        builder.BuildInto(self)
+
+
+class PoseTracker(Diagram):
+    """Twist that brings a base to a moving reference: feed-forward, and feedback by what its tyres allow.
+
+    Bases without fixed tyres are driven straight to the reference; bases with tyres on an axle, for which there is no
+    sideways, by a nonlinear law that is proven for them (`rollerbench.kinematics.tracking` has both, and sources).
+
+    Input ports:
+        q_xyt (3): pose of B in W, measured or estimated [m, m, rad].
+        reference_q_xyt (3): where B should be [m, m, rad].
+        reference_v_xyw_B (3): twist of the reference in its own axes [m/s, m/s, rad/s].
+    Output ports:
+        v_xyw_B (3): twist to command [m/s, m/s, rad/s]; limit it with a `TwistLimiter`.
+    """
+
+    def __init__(
+        self, robot: Robot | WheelKinematics | str | Path | Mapping[str, Any], gains: TrackingGains = DEFAULT_GAINS
+    ) -> None:
+        """Builds the diagram.
+
+        Args:
+            robot: The robot, or its kinematics.
+            gains: Gains.
+
+        Raises:
+            KinematicsError: the robot's tyres allow no motion.
+        """
+        super().__init__()
+        law = tracking_law(robot if isinstance(robot, WheelKinematics) else WheelKinematics(robot), gains)
+        names = ("q_xyt", "reference_q_xyt", "reference_v_xyw_B")
+        variables = [[Variable(f"{name}_{index}") for index in range(3)] for name in names]
+        with np.errstate(invalid="ignore"):  # numpy takes flags that Expressions raise for errors of its own
+            twist = law(*(np.array([Expression(each) for each in vector]) for vector in variables))
+        builder = DiagramBuilder()
+        inputs = builder.AddNamedSystem("inputs", Multiplexer([3, 3, 3]))
+        system = SymbolicVectorSystem(input=[each for vector in variables for each in vector], output=list(twist))
+        builder.AddNamedSystem("law", system)
+        builder.Connect(inputs.get_output_port(), system.get_input_port())
+        for index, name in enumerate(names):
+            builder.ExportInput(inputs.get_input_port(index), name)
+        builder.ExportOutput(system.get_output_port(), "v_xyw_B")
+        builder.BuildInto(self)
+
+
+def _twist_source(twist: Profile, start: ArrayLike) -> TrajectorySource:
+    """[q_xyt; v_xyw_B] of a twist over time."""
+    first = np.asarray(start, dtype=np.float64)
+    if first.shape != (3,) or not np.isfinite(first).all():
+        raise KinematicsError(f"start = {start!r}: accepted: three finite numbers [x, y, yaw]")
+    pieces = max(1, math.ceil(np.ptp(twist.breaks) / SAMPLE_TIME))
+    even = np.linspace(twist.breaks[0], twist.breaks[-1], pieces + 1)
+    # Close to a break no even sample is needed; nearly equal times make no pieces.
+    apart = np.abs(even[:, np.newaxis] - twist.breaks).min(axis=1) > 1e-3 * SAMPLE_TIME
+    times = np.sort(np.concatenate([twist.breaks, even[apart]]))
+    moved = reference_poses(twist, times)
+    yaw = first[2] + moved[:, 2]
+    poses = np.column_stack([first[:2] + odometry.rotate(first[2], moved[:, :2]), yaw])
+    twists = twist(times)
+    rates = np.column_stack([odometry.rotate(yaw, twists[:, :2]), twists[:, 2]])
+    trajectory = PiecewisePolynomial.CubicHermite(
+        times, np.column_stack([poses, twists]).T, np.column_stack([rates, twist.rate(times)]).T
+    )
+    return TrajectorySource(trajectory, zero_derivatives_beyond_limits=True)
+
+
+def _into_the_body() -> SymbolicVectorSystem:
+    """From [q_xyt; its rates in W] to [q_xyt; v_xyw_B]."""
+    q = [Variable(name) for name in ("x", "y", "yaw")]
+    vx, vy, w = (Variable(name) for name in ("vx", "vy", "w"))
+    c, s = cos(q[2]), sin(q[2])
+    return SymbolicVectorSystem(
+        input=[*q, vx, vy, w],
+        output=[*map(Expression, q), c * vx + s * vy, c * vy - s * vx, Expression(w)],
+    )
