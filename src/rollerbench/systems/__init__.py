@@ -6,6 +6,7 @@ from rollerbench.systems.kinematics import ForwardKinematics, InverseKinematics,
 from rollerbench.systems.leg_servo import LegServo, damp_joints, unlimited
 from rollerbench.systems.legs import GaitPlanner, LegInverseKinematics, LegTracker
 from rollerbench.systems.stance import BodyPoseController, LegWatch, StanceOdometry
+from rollerbench.systems.twist_limiter import TwistLimiter
 from rollerbench.systems.wheel_speed_controller import PidGains, WheelSpeedController, wheel_speed_gains
 
 __all__ = [
@@ -24,6 +25,7 @@ __all__ = [
     "RollResistance",
     "SlipMonitor",
     "StanceOdometry",
+    "TwistLimiter",
     "WheelSpeedController",
     "damp_joints",
     "unlimited",
