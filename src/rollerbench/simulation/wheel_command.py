@@ -111,7 +111,9 @@ def _add_tracker(
     reference = builder.AddNamedSystem("reference", ReferenceSource(motion))
     ports |= {"reference_pose": reference.GetOutputPort("q_xyt"), "reference_twist": reference.GetOutputPort("v_xyw_B")}
     # A twist that is held for a period lags by half of it: take the one in the middle.
-    ahead = builder.AddNamedSystem("feedforward", _source(replace(motion, breaks=motion.breaks - 0.5 * tracking.period)))
+    ahead = builder.AddNamedSystem(
+        "feedforward", _source(replace(motion, breaks=motion.breaks - 0.5 * tracking.period))
+    )
     builder.Connect(ports["reference_pose"], tracker.GetInputPort("reference_q_xyt"))
     builder.Connect(ahead.get_output_port(), tracker.GetInputPort("reference_v_xyw_B"))
     return twist, ports

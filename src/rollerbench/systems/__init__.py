@@ -8,6 +8,7 @@ from rollerbench.systems.legs import GaitPlanner, LegInverseKinematics, LegTrack
 from rollerbench.systems.pose_tracker import PoseTracker, ReferenceSource
 from rollerbench.systems.stance import BodyPoseController, LegWatch, StanceOdometry
 from rollerbench.systems.steering import SteeredOdometry, SteeringKinematics
+from rollerbench.systems.twist_limiter import TwistLimiter
 from rollerbench.systems.wheel_speed_controller import PidGains, WheelSpeedController, wheel_speed_gains
 
 __all__ = [
@@ -30,6 +31,7 @@ __all__ = [
     "StanceOdometry",
     "SteeredOdometry",
     "SteeringKinematics",
+    "TwistLimiter",
     "WheelSpeedController",
     "damp_joints",
     "unlimited",
