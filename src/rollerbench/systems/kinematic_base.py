@@ -80,7 +80,7 @@ class KinematicBase(Diagram):
         """
         pose = np.asarray(q_xyt, dtype=np.float64)
         if pose.shape != (3,) or not np.isfinite(pose).all():
-            raise KinematicsError(f"q_xyt = {q_xyt}: accepted: three finite numbers [x, y, yaw]")
+            raise KinematicsError(f"q_xyt = {q_xyt!r}: accepted: three finite numbers [x, y, yaw]")
         mine = self.GetMutableSubsystemContext(self.GetSubsystemByName(self._INTEGRATOR), context)
         if mine.has_only_continuous_state():
             mine.SetContinuousState(pose)
@@ -105,7 +105,8 @@ def _twist_matrix(robot: AnyRobot, command: str) -> NDArray[np.float64]:
 
 
 def _rate_integrator() -> SymbolicVectorSystem:
-    x, y, yaw = pose = [Variable(name) for name in ("x", "y", "yaw")]
+    pose = [Variable(name) for name in ("x", "y", "yaw")]
+    yaw = pose[2]
     vx, vy, wz = twist = [Variable(name) for name in ("vx", "vy", "wz")]
     return SymbolicVectorSystem(
         state=pose,
