@@ -72,6 +72,19 @@ def test_a_twist_is_projected_on_what_fixed_tyres_allow(robot: Any, expected: li
     assert twist == pytest.approx(expected, abs=1e-15)
 
 
+def test_wheel_speeds_without_residual_make_no_tyre_skid() -> None:
+    """A tyre under a Mecanum base: it gives way to wheels that would strafe, and their residual tells."""
+    data = robots.mecanum()
+    tyre = {**robots.TYRE, "name": "tyre", "position": [0.0, 0.0, 0.05], "driven": False}
+    kinematics = rb.WheelKinematics({**data, "wheels": [*data["wheels"], tyre]})
+    base = KinematicBase(kinematics)
+    for twist, skids in (([0.3, 0.0, 0.4], False), ([0.0, 0.3, 0.0], True)):
+        wheel_speeds = kinematics.inverse(twist, strict=False)
+        skid = kinematics.skid_speeds(base.GetOutputPort("v_xyw_B").Eval(_context(base, wheel_speeds)))
+        for size in (np.abs(skid).max(), np.abs(kinematics.residual(wheel_speeds)).max()):
+            assert size > 1e-3 if skids else size < 1e-13
+
+
 def test_wheel_speeds_of_steered_wheels_mean_nothing_without_their_angles() -> None:
     with pytest.raises(rb.KinematicsError, match=r"swerve_base steers wheels.*command='v_xyw_B'"):
         KinematicBase("swerve_base")

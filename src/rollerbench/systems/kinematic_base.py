@@ -22,15 +22,15 @@ class KinematicBase(Diagram):
         v_xyw_B = M u,  [x', y', yaw'] = [cos(yaw) vx - sin(yaw) vy, sin(yaw) vx + cos(yaw) vy, wz]    continuous
         q_xyt_next = q_xyt * exp(v_xyw_B time_step)                                                    discrete
 
-    Commanded by wheel speeds, M is the least squares of `WheelKinematics.forward`: no tyre skids, and wheels that
-    contradict each other share the difference, where those of a real base slip. Whoever plans with wheel speeds rules
-    such out (`WheelKinematics.residual` = 0). Steered wheels are held at the angles of the WheelKinematics.
+    Commanded by wheel speeds, M is the least squares of `WheelKinematics.forward`: wheels and tyres that contradict
+    each other share the difference, where those of a real base slip. Whoever plans with wheel speeds rules such out by
+    `WheelKinematics.residual` = 0, where no tyre skids. Steered wheels stay at the angles of the WheelKinematics.
 
     Commanded by a twist, M projects it on the twists at which no fixed tyre skids (`WheelKinematics.project`), and is
     the identity for robots without fixed tyres. Steered wheels are thought to follow at once, as castors do.
 
     The three numbers of the pose are all its state, so Drake's trajectory optimisation, linearisation and LQR take it.
-    Diagrams convert to AutoDiffXd and Expression as Diagram_[T]: named ports stay, `set_pose` does not.
+    Converted by ToAutoDiffXd() or ToSymbolic() it is a plain Diagram_[T]: the named ports stay, `set_pose` does not.
 
     Input ports:
         wheel_speeds (n_driven): in the order of robot.yaml [rad/s]; if command is "wheel_speeds".
