@@ -2,6 +2,7 @@
 
 from rollerbench.systems.contacts import RollResistance, SlipMonitor
 from rollerbench.systems.drivetrain import Drivetrain
+from rollerbench.systems.kinematic_base import KinematicBase
 from rollerbench.systems.kinematics import ForwardKinematics, InverseKinematics, Odometry, PlanarState
 from rollerbench.systems.leg_servo import LegServo, damp_joints, unlimited
 from rollerbench.systems.legs import GaitPlanner, LegInverseKinematics, LegTracker
@@ -17,6 +18,7 @@ __all__ = [
     "ForwardKinematics",
     "GaitPlanner",
     "InverseKinematics",
+    "KinematicBase",
     "LegInverseKinematics",
     "LegServo",
     "LegTracker",
