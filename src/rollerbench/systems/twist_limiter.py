@@ -64,7 +64,7 @@ class TwistLimiter(Diagram):
     for displacements takes numbers only: in variables its expressions would outgrow every memory.
 
     Input ports:
-        v_xyw_B (3): commanded twist of the point C [m/s, m/s, rad/s].
+        v_xyw_B (3): commanded twist of the point C, or displacement of C over dt [m/s, m/s, rad/s].
         p_BoCo_B (2): position of C from Bo, in B [m]; only with p_BoCo_B="port".
     Output ports:
         v_xyw_B (3): limited twist of Bo, or of the reference point of the WheelKinematics given [m/s, m/s, rad/s].
@@ -183,7 +183,7 @@ def _displacement(limits: TwistLimits, reference: Array, time_step: float) -> li
 
     The load is max_i |A_i v(k)| / speed_i, and 1 at the k looked for. As load / k changes with the turn only, k / load
     comes closer to that in each step. If the load is still above 1, the last step goes below: k / load^2. So the scale
-    may be too small, by what is left of the error, but the direction is exact.
+    may be too small, by what is left of the error, but the direction is exact. `_largest` gives squares of loads.
     """
     rate, center, scale = _variables("rate", 3), _variables("center", 2), Variable("scale")
     turn = np.zeros((1, 2, 3))
