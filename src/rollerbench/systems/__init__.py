@@ -5,6 +5,8 @@ from rollerbench.systems.drivetrain import Drivetrain
 from rollerbench.systems.kinematics import ForwardKinematics, InverseKinematics, Odometry, PlanarState
 from rollerbench.systems.leg_servo import LegServo, damp_joints, unlimited
 from rollerbench.systems.legs import GaitPlanner, LegInverseKinematics, LegTracker
+from rollerbench.systems.pose_estimator import PoseEstimator
+from rollerbench.systems.pose_sensors import GyroSensor, PoseFixSensor
 from rollerbench.systems.stance import BodyPoseController, LegWatch, StanceOdometry
 from rollerbench.systems.wheel_speed_controller import PidGains, WheelSpeedController, wheel_speed_gains
 
@@ -13,6 +15,7 @@ __all__ = [
     "Drivetrain",
     "ForwardKinematics",
     "GaitPlanner",
+    "GyroSensor",
     "InverseKinematics",
     "LegInverseKinematics",
     "LegServo",
@@ -21,6 +24,8 @@ __all__ = [
     "Odometry",
     "PidGains",
     "PlanarState",
+    "PoseEstimator",
+    "PoseFixSensor",
     "RollResistance",
     "SlipMonitor",
     "StanceOdometry",
