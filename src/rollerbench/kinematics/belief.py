@@ -128,24 +128,57 @@ def moved(belief: Belief, rates: Rates, dt: float, variances: Variances) -> tupl
 def corrected(belief: Belief, fix: Fix, variances: Variances) -> tuple[Belief, Any]:
     """Belief after a fix, and the fix's normalised innovation squared (chi-square of 3 degrees of freedom).
 
-    The noises of x, y and yaw are independent, so they are taken one after the other, each a scalar update.
+    The error of a pose is the step, turned into W, whose exponential leads from the estimate to the truth: places that
+    an uncertain heading has scattered along an arc are Gaussian in it. The step to the fix is the innovation; the
+    corrected step is then made, and the error's covariance turns with it. The noises of x, y and yaw are independent,
+    so the three are taken one after the other, each a scalar update.
     """
-    state, covariance = list(belief[:4]), list(belief[4:])
+    functions = _functions(belief.yaw)
+    turn = fix.pose[2] - belief.yaw
+    turn = turn - 2 * math.pi * functions.floor(turn / (2 * math.pi) + 0.5)
+    dx, dy = _chord(fix.pose[0] - belief.x, fix.pose[1] - belief.y, -0.5 * turn, functions)
+    stretch = _sinc(0.5 * turn, functions)
+    innovations = (dx / stretch, dy / stretch, turn)
+    step, covariance = [0.0, 0.0, 0.0, 0.0], list(belief[4:])
     distance = 0.0
     for index in range(3):
         column = [covariance[entry] for entry in ENTRIES[index]]
         total = column[index] + variances.fix[index]
-        innovation = fix.pose[index] - state[index]
-        if index == 2:
-            innovation = innovation - 2 * math.pi * _functions(innovation).floor(innovation / (2 * math.pi) + 0.5)
+        innovation = innovations[index] - step[index]
         distance = distance + innovation * innovation / total
         for row in range(4):
             gain = fix.weight * column[row] / total
-            state[row] = state[row] + gain * innovation
+            step[row] = step[row] + gain * innovation
             for other in range(row, 4):
                 entry = ENTRIES[row][other]
                 covariance[entry] = covariance[entry] - gain * column[other]
-    return Belief(*state, *covariance), distance
+    return _stepped(belief, step, covariance), distance
+
+
+def _stepped(belief: Belief, step: list[Any], covariance: list[Any]) -> Belief:
+    """Belief after a correction (4), a step in W and one of the bias; the covariance turns with the pose."""
+    functions = _functions(belief.yaw)
+    stretch = _sinc(0.5 * step[2], functions)
+    dx, dy = _chord(stretch * step[0], stretch * step[1], 0.5 * step[2], functions)
+    xx, xy, xt, yy, yt, tt, xb, yb, tb, bb = covariance
+    c, s = functions.cos(step[2]), functions.sin(step[2])
+    turned = (
+        *(c * (c * xx - 2 * s * xy) + s * s * yy, c * s * (xx - yy) + (c * c - s * s) * xy, c * xt - s * yt),
+        *(s * (s * xx + 2 * c * xy) + c * c * yy, s * xt + c * yt, tt),
+        *(c * xb - s * yb, s * xb + c * yb, tb, bb),
+    )
+    return Belief(belief.x + dx, belief.y + dy, belief.yaw + step[2], belief.bias + step[3], *turned)
+
+
+def _chord(x: Any, y: Any, angle: Any, functions: Any) -> tuple[Any, Any]:
+    """A vector turned counter-clockwise."""
+    cos, sin = functions.cos(angle), functions.sin(angle)
+    return cos * x - sin * y, sin * x + cos * y
+
+
+def _sinc(angle: Any, functions: Any) -> Any:
+    away = functions.sqrt(angle * angle + 1e-24)
+    return functions.sin(away) / away
 
 
 def crossed(interval: Interval, time_step: float, variances: Variances) -> tuple[Belief, Three]:

@@ -1,21 +1,26 @@
 """Where a robot is, by its wheels, a gyroscope and late absolute fixes: an extended Kalman filter with a memory.
 
-The state is the pose q = (x, y, yaw) in W and the bias b of the gyroscope, its error Gaussian with the covariance P
-(4, 4). In a time dt the wheels tell the step s of the body with the covariance Q (`uncertainty.step_covariance`), and
-the gyroscope reads its last component once more:
+The state is the pose q = (x, y, yaw) in W and the bias b of the gyroscope. The error of the pose is the step that leads
+from the estimate to the truth, turned into W: to first order the errors of x, y and yaw, and yet Gaussian where these
+are not, because an uncertain heading scatters places along an arc. With that of the bias its covariance is P (4, 4).
+
+In a time dt the wheels tell the step s of the body with the covariance Q (`uncertainty.step_covariance`), and the
+gyroscope reads its last component once more:
 
     yaw_rate dt = s_yaw + b dt + noise,      of variance N dt.
 
 So step and bias are first corrected by the difference of the two, one scalar Kalman update of (q, b, s), then the pose
 moves by the corrected step: q+ = q * exp(s), with the exact Jacobians of `uncertainty.step_terms`. Wheels that stand
-without noise thereby calibrate the gyroscope. A fix measures x, y and yaw in W, linear in the state.
+without noise thereby calibrate the gyroscope. A fix tells the error of the pose, with noise (`belief.corrected`).
 
 A fix tells of the past: it is taken at the state of its stamp, and the stored inputs from there on are used again, with
 all fixes in between. The estimate is therefore, to the bit, the one of fixes that had come at once and in order.
 
 Source: Bar-Shalom, Li and Kirubarajan (2001), Estimation with applications to tracking and navigation, section 10.3
-(extended Kalman filter) and 5.4 (its consistency); Chong and Kleeman (1997) for the wheels; Larsen, Andersen, Ravn and
-Poulsen (1998), Incorporation of time delayed measurements in a discrete-time Kalman filter, for late fixes.
+(extended Kalman filter) and 5.4 (its consistency); Barrau and Bonnabel (2017), The invariant extended Kalman filter as
+a stable observer, and Long, Wolfe, Mashner and Chirikjian (2012), The banana distribution is Gaussian, for the error of
+a pose; Chong and Kleeman (1997) for the wheels; Larsen, Andersen, Ravn and Poulsen (1998), Incorporation of time
+delayed measurements in a discrete-time Kalman filter, for late fixes.
 """
 
 import math
@@ -77,7 +82,7 @@ class PoseEstimate:
 
     @property
     def covariance(self) -> Array:
-        """Covariance (..., 4, 4) of x, y, yaw and the gyroscope's bias."""
+        """Covariance (..., 4, 4) of the errors of x, y, yaw and the gyroscope's bias."""
         return self.belief.covariance()
 
     @property
