@@ -148,3 +148,7 @@ def test_a_covariance_needs_a_noise() -> None:
     system = rb.systems.Odometry(robots.cart(), 0.01)
     with pytest.raises(rb.KinematicsError, match="made without a noise"):
         system.set_pose(system.CreateDefaultContext(), [0, 0, 0], np.eye(3))
+    system = rb.systems.Odometry(robots.cart(), 0.01, noise=OdometryNoise(travel=1e-4))
+    for bad in (np.eye(2), np.diag([1.0, -1.0, 1.0]), np.triu(np.ones((3, 3))), np.full((3, 3), np.nan)):
+        with pytest.raises(rb.KinematicsError, match=r"accepted: finite, symmetric, \(3, 3\)"):
+            system.set_pose(system.CreateDefaultContext(), [0, 0, 0], bad)

@@ -24,16 +24,19 @@ delayed measurements in a discrete-time Kalman filter, for late fixes.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import block_diag
 
+from rollerbench.description import Robot
 from rollerbench.errors import KinematicsError
 from rollerbench.kinematics.belief import Belief, Fix, Interval, Rates, Three, Variances, crossed, with_fix
-from rollerbench.kinematics.uncertainty import UPPER, GyroNoise, OdometryNoise
+from rollerbench.kinematics.uncertainty import UPPER, GyroNoise, OdometryNoise, checked_covariance
 from rollerbench.kinematics.wheels import WheelKinematics
 
 Array = NDArray[np.float64]
@@ -110,7 +113,7 @@ class PoseFilter:
 
     def __init__(
         self,
-        robot: WheelKinematics | Any,
+        robot: Robot | WheelKinematics | str | Path | Mapping[str, Any],
         time_step: float,
         *,
         wheels: OdometryNoise,
@@ -135,17 +138,7 @@ class PoseFilter:
         Raises:
             KinematicsError: an argument is not accepted.
         """
-        deviation = np.asarray(fix_deviation, dtype=np.float64)
-        if not (math.isfinite(time_step) and time_step > 0):
-            raise KinematicsError(f"time_step = {time_step}: accepted: a positive number of seconds")
-        if not (math.isfinite(largest_latency) and largest_latency >= 0):
-            raise KinematicsError(f"largest_latency = {largest_latency}: accepted: 0 s or more")
-        if deviation.shape != (3,) or not (np.isfinite(deviation) & (deviation > 0)).all():
-            raise KinematicsError(f"fix_deviation = {fix_deviation!r}: accepted: three positive numbers [m, m, rad]")
-        if not gyro.density > 0:
-            raise KinematicsError(f"density = {gyro.density} of the gyroscope: accepted: a positive number")
-        if gate is not None and not gate > 0:
-            raise KinematicsError(f"gate = {gate}: accepted: a positive number, or None")
+        deviation = _checked(time_step, gyro, fix_deviation, largest_latency, gate)
         self.kinematics = robot if isinstance(robot, WheelKinematics) else WheelKinematics(robot)
         self.time_step = time_step
         self.latency_steps = math.ceil(largest_latency / time_step - SNAP)
@@ -174,14 +167,18 @@ class PoseFilter:
                 variances: the first fix then sets it.
             gyro_bias: Expected bias (...) [rad/s]; how well it is known is the noise's bias_deviation.
             step: Number of the time step that comes next: time / time_step.
+
+        Raises:
+            KinematicsError: a value is not finite, or the covariance is none.
         """
         pose = np.asarray(q_xyt, dtype=np.float64)
         if pose.ndim == 0 or pose.shape[-1] != 3 or not np.isfinite(pose).all():
             raise KinematicsError(f"q_xyt = {q_xyt!r}: accepted: finite numbers (..., 3)")
-        matrix = np.zeros((3, 3)) if covariance is None else np.asarray(covariance, dtype=np.float64)
-        if matrix.shape != (3, 3) or not np.linalg.eigvalsh(matrix).min() >= -1e-12 * np.trace(matrix):
-            raise KinematicsError(f"covariance = {covariance!r}: accepted: (3, 3), without negative eigenvalues")
-        bias = np.broadcast_to(np.asarray(gyro_bias, dtype=np.float64), pose.shape[:-1])
+        bias = np.asarray(gyro_bias, dtype=np.float64)
+        if not np.isfinite(bias).all():
+            raise KinematicsError(f"gyro_bias = {gyro_bias!r}: accepted: finite numbers")
+        matrix = checked_covariance(np.zeros((3, 3)) if covariance is None else covariance)
+        bias = np.broadcast_to(bias, pose.shape[:-1])
         variances = (*matrix[UPPER].tolist(), 0.0, 0.0, 0.0, self._bias_variance)
         entries = np.broadcast_to(np.array(variances), (*bias.shape, len(variances)))
         belief = Belief(*_parts(np.concatenate([pose, bias[..., np.newaxis], entries], axis=-1)))
@@ -213,7 +210,8 @@ class PoseFilter:
         return PoseEstimate(step=step, belief=belief, twist=twist, history=history, stamp=stamp, fixes=counts)
 
     def _rates(self, wheel_speeds: ArrayLike, yaw_rate: ArrayLike) -> Rates:
-        speeds, rate = np.asarray(wheel_speeds, dtype=np.float64), np.asarray(yaw_rate, dtype=np.float64)
+        # What is kept is copied: the caller may use its arrays again.
+        speeds, rate = np.asarray(wheel_speeds, dtype=np.float64), np.array(yaw_rate, dtype=np.float64)
         size = len(self._rates_matrix) // 2
         if speeds.ndim == 0 or speeds.shape[-1] != size:
             raise KinematicsError(f"wheel_speeds has shape {speeds.shape}: accepted: (..., {size})")
@@ -227,7 +225,9 @@ class PoseFilter:
         self, estimate: PoseEstimate, history: tuple[Interval, ...], pose_fix: ArrayLike
     ) -> tuple[float, FixCounts, tuple[Interval, ...]]:
         """Puts a fix where it belongs in the history, and brings the history up to date."""
-        fix = np.asarray(pose_fix, dtype=np.float64)
+        fix = np.array(pose_fix, dtype=np.float64)
+        if fix.ndim == 0 or fix.shape[-1] != 4:
+            raise KinematicsError(f"pose_fix has shape {fix.shape}: accepted: (..., 4)")
         stamp = float(fix.flat[0])
         if math.isnan(stamp) or stamp == estimate.stamp:
             return estimate.stamp, estimate.fixes, history
@@ -254,3 +254,21 @@ class PoseFilter:
 def _parts(vectors: Array) -> Any:
     """Components of vectors (..., n): plain numbers, which are fast, or arrays (...)."""
     return tuple(vectors.tolist()) if vectors.ndim == 1 else tuple(np.moveaxis(vectors, -1, 0))
+
+
+def _checked(
+    time_step: float, gyro: GyroNoise, fix_deviation: ArrayLike, largest_latency: float, gate: float | None
+) -> Array:
+    """The standard deviations (3,) of a fix, if all parameters are accepted."""
+    deviation = np.asarray(fix_deviation, dtype=np.float64)
+    if not (math.isfinite(time_step) and time_step > 0):
+        raise KinematicsError(f"time_step = {time_step}: accepted: a positive number of seconds")
+    if not (math.isfinite(largest_latency) and largest_latency >= 0):
+        raise KinematicsError(f"largest_latency = {largest_latency}: accepted: 0 s or more")
+    if deviation.shape != (3,) or not (np.isfinite(deviation) & (deviation > 0)).all():
+        raise KinematicsError(f"fix_deviation = {fix_deviation!r}: accepted: three positive numbers [m, m, rad]")
+    if not gyro.density > 0:
+        raise KinematicsError(f"density = {gyro.density} of the gyroscope: accepted: a positive number")
+    if gate is not None and not gate > 0:
+        raise KinematicsError(f"gate = {gate}: accepted: a positive number, or None")
+    return deviation

@@ -39,7 +39,8 @@ class OdometryNoise:
 
         (travel / R |q'| + speed) dt      [rad^2].
 
-    Each is a number for all driven wheels, a sequence in the order of robot.yaml, or a mapping by wheel name.
+    Each is a number for all driven wheels, a sequence in the order of robot.yaml, or a mapping by wheel name. As
+    only the measured q' is known, the noise of a sample should be small against it.
 
     A wrong wheel radius or track is no white noise: its error grows with the travel, not with the square root of it.
     Calibrate it away; what remains, a relative error e, is covered by inflating the noise so that it is as large after
@@ -199,6 +200,21 @@ def propagate(
     """
     before, added = (np.asarray(matrix, dtype=np.float64) for matrix in (covariance, step_covariance))
     return symmetric(spread(upper(before), _terms(q_xyt, v_xyw_B, dt), upper(added)))
+
+
+def checked_covariance(covariance: ArrayLike) -> Array:
+    """A covariance (3, 3) of a pose.
+
+    Raises:
+        KinematicsError: it is none.
+    """
+    matrix = np.asarray(covariance, dtype=np.float64)
+    shaped = matrix.shape == (3, 3) and np.isfinite(matrix).all() and np.allclose(matrix, matrix.T, rtol=1e-9, atol=0.0)
+    if not (shaped and np.linalg.eigvalsh(matrix).min() >= -1e-12 * np.trace(matrix)):
+        raise KinematicsError(
+            f"covariance = {covariance!r}: accepted: finite, symmetric, (3, 3), without negative eigenvalues"
+        )
+    return matrix
 
 
 def upper(matrix: Array) -> Six:

@@ -18,7 +18,7 @@ from pydrake.systems.primitives import MatrixGain, Multiplexer, SymbolicVectorSy
 from rollerbench.description import Robot
 from rollerbench.errors import KinematicsError
 from rollerbench.kinematics import WheelKinematics
-from rollerbench.kinematics.uncertainty import UPPER, OdometryNoise, StepTerms, spread, step_terms
+from rollerbench.kinematics.uncertainty import UPPER, OdometryNoise, StepTerms, checked_covariance, spread, step_terms
 
 AnyRobot = Robot | WheelKinematics | str | Path | Mapping[str, Any]
 
@@ -107,7 +107,7 @@ class Odometry(Diagram):
             if not self.HasSubsystemNamed(self._COVARIANCE):
                 raise KinematicsError("covariance: this Odometry was made without a noise; accepted: None")
             spreading = self.GetMutableSubsystemContext(self.GetSubsystemByName(self._COVARIANCE), context)
-            spreading.SetDiscreteState(np.asarray(covariance, np.float64)[UPPER])
+            spreading.SetDiscreteState(checked_covariance(covariance)[UPPER])
 
 
 class PlanarState(Diagram):

@@ -12,6 +12,15 @@ from rollerbench.kinematics.estimation import PoseEstimate, PoseFilter
 from rollerbench.kinematics.uncertainty import GyroNoise, OdometryNoise
 from rollerbench.systems.kinematics import AnyRobot
 
+OUTPUTS: dict[str, tuple[int, Any]] = {
+    "q_xyt": (3, lambda estimate: estimate.q_xyt),
+    "covariance": (9, lambda estimate: estimate.covariance[:3, :3].ravel()),
+    "gyro_bias": (1, lambda estimate: estimate.gyro_bias),
+    "v_xyw_B": (3, lambda estimate: estimate.v_xyw_B),
+    "fix_counts": (4, lambda estimate: np.array(estimate.fixes, dtype=np.float64)),
+}
+"""Size of each output port, and where its value is in the estimate."""
+
 
 class PoseEstimator(LeafSystem):
     """Pose from wheel speeds, a gyroscope and late pose fixes: `estimation.PoseFilter`, once in a period of control.
@@ -101,13 +110,3 @@ class PoseEstimator(LeafSystem):
 
     def _calc(self, context: Context, output: BasicVector, values: Any) -> None:
         output.SetFromVector(np.atleast_1d(values(self.estimate(context))))
-
-
-OUTPUTS: dict[str, tuple[int, Any]] = {
-    "q_xyt": (3, lambda estimate: estimate.q_xyt),
-    "covariance": (9, lambda estimate: estimate.covariance[:3, :3].ravel()),
-    "gyro_bias": (1, lambda estimate: estimate.gyro_bias),
-    "v_xyw_B": (3, lambda estimate: estimate.v_xyw_B),
-    "fix_counts": (4, lambda estimate: np.array(estimate.fixes, dtype=np.float64)),
-}
-"""Size of each output port, and where its value is in the estimate."""

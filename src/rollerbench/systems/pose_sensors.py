@@ -133,7 +133,7 @@ def _normal(seed: int, stream: int, number: int, size: int) -> Array:
 
 
 def _checked(seed: int) -> int:
-    if not 0 <= seed < 2**63:
+    if not (isinstance(seed, int | np.integer) and 0 <= seed < 2**63):
         raise KinematicsError(f"seed = {seed}: accepted: a whole number of 0 or more")
     return int(seed)
 
