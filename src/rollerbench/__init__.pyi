@@ -27,10 +27,12 @@ from .errors import SimulationError as SimulationError
 from .errors import UnreachableTarget as UnreachableTarget
 from .kinematics import Mobility as Mobility
 from .kinematics import WheelKinematics as WheelKinematics
+from .kinematics import estimation as estimation
 from .kinematics import gaits as gaits
 from .kinematics import legs as legs
 from .kinematics import limits as limits
 from .kinematics import odometry as odometry
+from .kinematics import uncertainty as uncertainty
 from .plant import RobotModel as RobotModel
 from .plant import add_ground as add_ground
 from .plant import add_robot as add_robot

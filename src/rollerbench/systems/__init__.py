@@ -6,6 +6,8 @@ from rollerbench.systems.kinematic_base import KinematicBase
 from rollerbench.systems.kinematics import ForwardKinematics, InverseKinematics, Odometry, PlanarState
 from rollerbench.systems.leg_servo import LegServo, damp_joints, unlimited
 from rollerbench.systems.legs import GaitPlanner, LegInverseKinematics, LegTracker
+from rollerbench.systems.pose_estimator import PoseEstimator
+from rollerbench.systems.pose_sensors import GyroSensor, PoseFixSensor
 from rollerbench.systems.pose_tracker import PoseTracker, ReferenceSource
 from rollerbench.systems.stance import BodyPoseController, LegWatch, StanceOdometry
 from rollerbench.systems.steering import SteeredOdometry, SteeringKinematics
@@ -17,6 +19,7 @@ __all__ = [
     "Drivetrain",
     "ForwardKinematics",
     "GaitPlanner",
+    "GyroSensor",
     "InverseKinematics",
     "KinematicBase",
     "LegInverseKinematics",
@@ -26,6 +29,8 @@ __all__ = [
     "Odometry",
     "PidGains",
     "PlanarState",
+    "PoseEstimator",
+    "PoseFixSensor",
     "PoseTracker",
     "ReferenceSource",
     "RollResistance",

@@ -10,13 +10,15 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from pydrake import symbolic
 from pydrake.symbolic import Expression, Variable, atan2, cos, sin, sqrt
-from pydrake.systems.framework import Context, Diagram, DiagramBuilder
-from pydrake.systems.primitives import MatrixGain, SymbolicVectorSystem
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder, System
+from pydrake.systems.primitives import MatrixGain, Multiplexer, SymbolicVectorSystem
 
 from rollerbench.description import Robot
 from rollerbench.errors import KinematicsError
 from rollerbench.kinematics import WheelKinematics
+from rollerbench.kinematics.uncertainty import UPPER, OdometryNoise, StepTerms, checked_covariance, spread, step_terms
 
 AnyRobot = Robot | WheelKinematics | str | Path | Mapping[str, Any]
 
@@ -54,36 +56,58 @@ class ForwardKinematics(Diagram):
 class Odometry(Diagram):
     """Pose from wheel speeds, advanced every time step by the exponential of SE(2) as `odometry.integrate` does.
 
+    With the noise of its wheels it also tells how far the pose can be trusted, as `uncertainty.propagate` does.
+
     Input ports:
         wheel_speeds (n_driven): in the order of robot.yaml [rad/s].
     Output ports:
         q_xyt (3): pose of B in W; the yaw counts full turns [m, m, rad].
+        covariance (9): of x, y, yaw in W, row by row [m, m, rad]^2; only if a noise was given.
     """
 
     _INTEGRATOR = "integrator"
+    _COVARIANCE = "covariance"
 
-    def __init__(self, robot: AnyRobot, time_step: float) -> None:
-        """Builds the diagram; the pose starts at the origin (see `set_pose`).
+    def __init__(self, robot: AnyRobot, time_step: float, *, noise: OdometryNoise | None = None) -> None:
+        """Builds the diagram; the pose starts at the origin, without doubt (see `set_pose`).
 
         Args:
             robot: The robot, or its kinematics.
             time_step: Period of the updates [s].
+            noise: Noise of the measured wheel speeds, for the covariance.
+
+        Raises:
+            KinematicsError: time_step is not positive, or the noise does not fit the robot.
         """
         super().__init__()
         if not (np.isfinite(time_step) and time_step > 0):
             raise KinematicsError(f"time_step = {time_step}: accepted: a positive number of seconds")
+        kinematics = _kinematics(robot)
         builder = DiagramBuilder()
-        twist = builder.AddNamedSystem("forward_kinematics", MatrixGain(_kinematics(robot).forward_matrix))
+        twist = builder.AddNamedSystem("forward_kinematics", MatrixGain(kinematics.forward_matrix))
         pose = builder.AddNamedSystem(self._INTEGRATOR, _se2_integrator(time_step))
         builder.Connect(twist.get_output_port(), pose.get_input_port())
-        builder.ExportInput(twist.get_input_port(), "wheel_speeds")
+        wheel_speeds = builder.ExportInput(twist.get_input_port(), "wheel_speeds")
         builder.ExportOutput(pose.get_output_port(), "q_xyt")
+        if noise is not None:
+            steps = builder.AddNamedSystem("step_covariance", _step_covariance(kinematics, noise, time_step))
+            terms = builder.AddNamedSystem("step_terms", _step_terms(time_step))
+            spreading = builder.AddNamedSystem(self._COVARIANCE, _se2_covariance(time_step))
+            builder.ConnectInput(wheel_speeds, steps.get_input_port())
+            _connect(builder, (pose, twist), terms)
+            _connect(builder, (terms, steps), spreading)
+            builder.ExportOutput(spreading.get_output_port(), "covariance")
         builder.BuildInto(self)
 
-    def set_pose(self, context: Context, q_xyt: ArrayLike) -> None:
-        """Sets the pose (3,) in a context of this system."""
+    def set_pose(self, context: Context, q_xyt: ArrayLike, covariance: ArrayLike | None = None) -> None:
+        """Sets the pose (3,), and its covariance (3, 3) if there is one, in a context of this system."""
         integrator = self.GetSubsystemByName(self._INTEGRATOR)
         self.GetMutableSubsystemContext(integrator, context).SetDiscreteState(np.asarray(q_xyt, np.float64))
+        if covariance is not None:
+            if not self.HasSubsystemNamed(self._COVARIANCE):
+                raise KinematicsError("covariance: this Odometry was made without a noise; accepted: None")
+            spreading = self.GetMutableSubsystemContext(self.GetSubsystemByName(self._COVARIANCE), context)
+            spreading.SetDiscreteState(checked_covariance(covariance)[UPPER])
 
 
 class PlanarState(Diagram):
@@ -151,3 +175,51 @@ def _se2_integrator(time_step: float) -> SymbolicVectorSystem:
         output=[Expression(variable) for variable in pose],
         time_period=time_step,
     )
+
+
+def _step_covariance(kinematics: WheelKinematics, noise: OdometryNoise, time_step: float) -> Diagram:
+    """From wheel speeds to the entries (6) of the covariance of a step; see `uncertainty.step_covariance`."""
+    speeds = [Variable(f"speed_{index}") for index in range(len(kinematics.drive_matrix))]
+    coefficients = zip(*noise.coefficients(kinematics), speeds, strict=True)
+    # The tiny summand gives |speed| a derivative at rest.
+    variances = [time_step * (slope * sqrt(speed * speed + 1e-24) + rest) for slope, rest, speed in coefficients]
+    forward = kinematics.forward_matrix
+    builder = DiagramBuilder()
+    angles = builder.AddNamedSystem("angle_variances", SymbolicVectorSystem(input=speeds, output=variances))
+    gain = builder.AddNamedSystem("gain", MatrixGain(forward[UPPER[0]] * forward[UPPER[1]]))
+    builder.Connect(angles.get_output_port(), gain.get_input_port())
+    builder.ExportInput(angles.get_input_port(), "wheel_speeds")
+    builder.ExportOutput(gain.get_output_port(), "step_covariance")
+    return builder.Build()
+
+
+def _step_terms(time_step: float) -> SymbolicVectorSystem:
+    """From [pose; twist] to the `StepTerms`."""
+    pose = [Variable(name) for name in ("x", "y", "yaw")]
+    twist = [Variable(name) for name in ("vx", "vy", "wz")]
+    terms = step_terms(pose[2], [time_step * rate for rate in twist], symbolic)
+    return SymbolicVectorSystem(input=[*pose, *twist], output=list(terms))
+
+
+def _se2_covariance(time_step: float) -> SymbolicVectorSystem:
+    """From [step terms; covariance of the step] to the covariance of the pose."""
+    xx, xy, xt, yy, yt, tt = state = [Variable(name) for name in ("xx", "xy", "xt", "yy", "yt", "tt")]
+    terms = [Variable(name) for name in StepTerms._fields]
+    xx_q, xy_q, xt_q, yy_q, yt_q, tt_q = added = [Variable(f"{entry}_step") for entry in state]
+    dynamics = spread((xx, xy, xt, yy, yt, tt), StepTerms(*terms), (xx_q, xy_q, xt_q, yy_q, yt_q, tt_q))
+    return SymbolicVectorSystem(
+        state=state,
+        input=[*terms, *added],
+        dynamics=list(dynamics),
+        output=[Expression(entry) for entry in (xx, xy, xt, xy, yy, yt, xt, yt, tt)],
+        time_period=time_step,
+    )
+
+
+def _connect(builder: DiagramBuilder, sources: tuple[System, ...], target: System) -> None:
+    """Joins the outputs of systems to the one input of another."""
+    sizes = [source.get_output_port().size() for source in sources]
+    joined = builder.AddNamedSystem(f"{target.get_name()}_inputs", Multiplexer(sizes))
+    for index, source in enumerate(sources):
+        builder.Connect(source.get_output_port(), joined.get_input_port(index))
+    builder.Connect(joined.get_output_port(), target.get_input_port())
