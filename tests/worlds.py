@@ -79,7 +79,8 @@ class World:
         self.models: list[rb.RobotModel] = []
 
     def add(self, robot: Any, roller_model: str | None = None) -> rb.RobotModel:
-        model = rb.add_robot(self.plant, robot, roller_model=roller_model or self.roller_model, builder=self.builder)
+        options = {"roller_model": roller_model or self.roller_model, "builder": self.builder, "visuals": False}
+        model = rb.add_robot(self.plant, robot, **options)
         self.models.append(model)
         return model
 

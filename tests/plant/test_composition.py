@@ -33,7 +33,7 @@ def two_robots(first: Any, second: Any, at: Sequence[Sequence[float]], roller_mo
 
 @cache
 def driven(roller_model: str, before: str | None, after: str | None) -> Any:
-    """The pose of a Mecanum robot's body after a second, with another model added before or after it."""
+    """The pose of a Mecanum robot's body after a moment, with another model added before or after it."""
     world = World(roller_model)
     others: dict[str, Added] = {}
 
@@ -50,7 +50,7 @@ def driven(roller_model: str, before: str | None, after: str | None) -> Any:
             others[kind] = world.add(NEIGHBOURS[kind])
 
     add(before)
-    model = world.add(robots.mecanum())
+    model = world.add(robots.mecanum(count=8))
     add(after)
     world.start()
     for kind, other in others.items():
@@ -62,13 +62,13 @@ def driven(roller_model: str, before: str | None, after: str | None) -> Any:
             body = world.plant.GetBodyByName("box", other)
             world.plant.SetFreeBodyPose(world.context, body, RigidTransform([0.0, 3.0, 0.5 * BOX_SIZE]))
     world.drive(model, [0.3, 0.1, 0.4])
-    world.simulator.AdvanceTo(0.3)
-    assert world.q_xyt(model)[0] > 0.07
+    world.simulator.AdvanceTo(0.2)
+    assert world.q_xyt(model)[0] > 0.04
     return world.plant.EvalBodyPoseInWorld(world.context, model.body).GetAsMatrix4()
 
 
 NEIGHBOURS: dict[str, Any] = {
-    "same": robots.mecanum(),
+    "same": robots.mecanum(count=8),
     "cart": robots.cart(),
     "hexapod": "wheel_leg_hexapod",
     "fixed": None,
@@ -93,11 +93,11 @@ def crowd(roller_model: str) -> World:
     """One robot of each kind, two of one, models on moving parts of theirs, and models beside them."""
     world = World(roller_model)
     add_model(world.plant, BOX)
-    first = world.add(robots.mecanum())
+    first = world.add(robots.mecanum(count=8))
     swerve = world.add(robots.swerve())
     world.add_arm(swerve.plant.GetBodyByName("fl_fork", swerve.model_instance).body_frame())
     world.add("wheel_leg_hexapod")
-    world.add(robots.mecanum(), "full" if roller_model == "windowed" else "windowed")
+    world.add(robots.mecanum(count=8), "full" if roller_model == "windowed" else "windowed")
     world.add(robots.cart())
     world.add_arm(first.body.body_frame(), first.X_BT)
     world.add(robots.kiwi())
@@ -184,7 +184,7 @@ def test_robots_are_placed_one_by_one_and_named_apart() -> None:
 def test_robots_on_wheels_and_on_legs_of_both_roller_models_move_together() -> None:
     """One call follows the windowed ones; a full and a windowed robot of a kind go the same way."""
     world = World()
-    full, windowed = world.add(robots.mecanum(), "full"), world.add(robots.mecanum())
+    full, windowed = world.add(robots.mecanum(count=8), "full"), world.add(robots.mecanum(count=8))
     kiwi, hexapod = world.add(robots.kiwi()), world.add("wheel_leg_hexapod")
     world.start()
     for index, model in enumerate(world.models):
@@ -192,13 +192,13 @@ def test_robots_on_wheels_and_on_legs_of_both_roller_models_move_together() -> N
         if not model.robot.legs:
             world.drive(model, [0.2, 0.2, 0.3])
     stood = world.plant.EvalBodyPoseInWorld(world.context, hexapod.body).translation()
-    world.simulator.AdvanceTo(0.8)
+    world.simulator.AdvanceTo(0.5)
     ends = [world.q_xyt(model) - [0.0, 2.0 * index, 0.0] for index, model in enumerate(world.models[:3])]
     assert ends[0] == pytest.approx(ends[1], abs=1e-4)
-    expected = rb.odometry.integrate(np.zeros(3), [0.2, 0.2, 0.3], 0.8)
+    expected = rb.odometry.integrate(np.zeros(3), [0.2, 0.2, 0.3], 0.5)
     for end in ends:
-        # 5 %: finite rollers, and the start from rest at full speed.
-        assert end == pytest.approx(expected, rel=0.05)
+        # 12 mm: finite rollers, and slip as they start from rest at full speed.
+        assert end == pytest.approx(expected, abs=0.012)
     assert full.roller_window is None
     assert windowed.roller_window is not None
     assert kiwi.roller_window is not None
@@ -208,11 +208,11 @@ def test_robots_on_wheels_and_on_legs_of_both_roller_models_move_together() -> N
 @ROLLER_MODELS
 def test_robots_that_meet_stop_each_other(roller_model: str) -> None:
     """Head on, body against body."""
-    start = [(-0.35, 0.0, 0.0), (0.35, 0.0, np.pi)]
+    start = [(-0.31, 0.0, 0.0), (0.31, 0.0, np.pi)]
     world = two_robots("youbot_base", "youbot_base", start, roller_model)
     for model in world.models:
         world.drive(model, [0.15, 0.0, 0.0])
-    world.simulator.AdvanceTo(1.0)
+    world.simulator.AdvanceTo(0.5)
     assert frozenset({"youbot_base", "youbot_base_1"}) in world.touching()
     left, right = (world.q_xyt(model) for model in world.models)
     length = world.models[0].robot.body.size[0]
@@ -221,11 +221,11 @@ def test_robots_that_meet_stop_each_other(roller_model: str) -> None:
 
 
 def test_wheels_that_meet_sideways_stop_robots_that_have_all_their_rollers() -> None:
-    start = [(0.0, -0.2, 0.0), (0.0, 0.2, 0.0)]
+    start = [(0.0, -0.18, 0.0), (0.0, 0.18, 0.0)]
     world = two_robots("youbot_base", "youbot_base", start, "full")
     for model, side in zip(world.models, (1.0, -1.0), strict=True):
         world.drive(model, [0.0, 0.1 * side, 0.0])
-    world.simulator.AdvanceTo(0.6)
+    world.simulator.AdvanceTo(0.4)
     assert frozenset({"youbot_base", "youbot_base_1"}) in world.touching()
     right, left = (world.q_xyt(model) for model in world.models)
     assert left[1] - right[1] > 0.3
@@ -237,17 +237,17 @@ def test_a_robot_pushes_a_box(roller_model: str) -> None:
     box = world.plant.GetBodyByName("box", add_model(world.plant, BOX))
     model = world.add("youbot_base")
     world.start()
-    front, gap = 0.5 * model.robot.body.size[0], 0.05
+    front, gap = 0.5 * model.robot.body.size[0], 0.02
     at = front + gap + 0.5 * BOX_SIZE
     world.plant.SetFreeBodyPose(world.context, box, RigidTransform([at, 0.0, 0.5 * BOX_SIZE]))
     world.drive(model, [0.25, 0.0, 0.0])
-    world.simulator.AdvanceTo(0.1)
+    world.simulator.AdvanceTo(0.05)
     assert world.plant.EvalBodyPoseInWorld(world.context, box).translation()[0] == pytest.approx(at, abs=1e-6)
-    world.simulator.AdvanceTo(0.6)
+    world.simulator.AdvanceTo(0.4)
     assert frozenset({"box", "youbot_base"}) in world.touching()
     assert world.x_ahead(model, box) == pytest.approx(at - gap, abs=1e-3)
     before = world.q_xyt(model)[0]
-    world.simulator.AdvanceTo(1.0)
+    world.simulator.AdvanceTo(0.8)
     assert world.q_xyt(model) == pytest.approx([before + 0.25 * 0.4, 0.0, 0.0], abs=2e-3)
     assert world.x_ahead(model, box) == pytest.approx(at - gap, abs=1e-3)
 
@@ -270,7 +270,7 @@ def test_a_base_drives_on_with_an_arm_on_top(roller_model: str) -> None:
     for each, which in ((world, model), (bare, other)):
         which.set_pose(each.context, (1.0, 2.0, 0.5))
         each.drive(which, [0.2, 0.2, 0.3])
-        each.simulator.AdvanceTo(1.0)
+        each.simulator.AdvanceTo(0.6)
     # 1 mm: the load shares out over the wheels in another way, which slip a little as the base starts at once.
     assert world.q_xyt(model) == pytest.approx(bare.q_xyt(other), abs=1e-3)
     # 10 mrad: the weight of the bent arm, and the start, on its servos.
@@ -332,7 +332,7 @@ def test_slip_and_rolling_resistance_are_each_robots_own() -> None:
     for index, model in enumerate(world.models):
         model.set_pose(world.context, (0.0, 2.0 * index, 0.0))
         world.drive(model, [0.3, 0.0, 0.0])
-    world.simulator.AdvanceTo(0.5)
+    world.simulator.AdvanceTo(0.3)
     root = world.simulator.get_context()
     own = np.arange(world.plant.num_velocities(), dtype=float)
     for model, monitor, drag in zip(world.models, monitors, drags, strict=True):
@@ -355,6 +355,13 @@ def test_a_robot_that_hangs_on_another_model_is_refused_by_name() -> None:
         with pytest.raises(rb.SimulationError, match=r"test_kiwi is not free.*WeldFrames\(model.body.body_frame"):
             ask()
     assert model.wheel_speed_matrix().any(axis=1).all()
+
+
+def test_matrices_of_a_plant_that_is_not_finalized_are_refused() -> None:
+    model = World().add(robots.cart())
+    for ask in (model.desired_state_matrix, model.actuation_matrix):
+        with pytest.raises(rb.SimulationError, match=r"not finalized; accepted: after plant.Finalize\(\)"):
+            ask()
 
 
 def test_every_contact_between_parts_of_one_robot_is_left_out() -> None:

@@ -81,6 +81,9 @@ class RobotModel:
     @property
     def actuators(self) -> list[JointActuator]:
         """Actuators in the order of the plant's actuation and desired state ports."""
+        if not self.plant.is_finalized():
+            # Drake's list is empty until then, and joints would be missing without a word.
+            raise SimulationError("actuators: the plant is not finalized; accepted: after plant.Finalize()")
         return [
             self.plant.get_joint_actuator(index) for index in self.plant.GetJointActuatorIndices(self.model_instance)
         ]
