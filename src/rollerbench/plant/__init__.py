@@ -1,7 +1,8 @@
 """Robots as parts of a Drake MultibodyPlant."""
 
 from rollerbench.plant.ground import add_ground
-from rollerbench.plant.robot_model import RobotModel, add_robot
+from rollerbench.plant.robot import add_robot
+from rollerbench.plant.robot_model import RobotModel
 from rollerbench.plant.window import RollerWindow, follow_rollers
 from rollerbench.sdf.servo import LegGains, ServoGains, servo_gains
 

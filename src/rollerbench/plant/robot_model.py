@@ -1,32 +1,20 @@
 """A robot as part of a MultibodyPlant."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydrake.math import RigidTransform, RollPitchYaw
-from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import (
-    JointActuator,
-    JointIndex,
-    ModelInstanceIndex,
-    RevoluteJoint,
-    RigidBody,
-)
-from pydrake.systems.framework import Context, DiagramBuilder
+from pydrake.multibody.tree import JointActuator, ModelInstanceIndex, RevoluteJoint, RigidBody
+from pydrake.systems.framework import Context
 
-from rollerbench.description import AnyWheel, Leg, Robot, load_robot
+from rollerbench.description import AnyWheel, Leg, Robot
 from rollerbench.errors import SimulationError
-from rollerbench.plant.servos import leg_and_wheel_joints, set_gains
-from rollerbench.plant.window import RollerWindow, WindowedWheel
-from rollerbench.sdf import names, robot_to_sdf
+from rollerbench.plant.servos import leg_and_wheel_joints
+from rollerbench.plant.window import RollerWindow
+from rollerbench.sdf import names
 from rollerbench.sdf.contact import static_penetration
-from rollerbench.sdf.servo import ServoGains, servo_gains
-from rollerbench.sdf.window import DEFAULT_SIZE, Window, windows
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,8 +69,21 @@ class RobotModel:
         return self.plant.GetBodyByName(names.foot(leg.name), self.model_instance)
 
     @property
+    def X_BT(self) -> RigidTransform:
+        """Where to weld an arm or a payload: frame T in the middle of the top of the body's box, parallel to B.
+
+        plant.WeldFrames(model.body.body_frame(), base_of_the_arm, model.X_BT)
+        """
+        box = self.robot.body
+        x, y, z = box.box_center
+        return RigidTransform([x, y, z + 0.5 * box.size[2]])
+
+    @property
     def actuators(self) -> list[JointActuator]:
         """Actuators in the order of the plant's actuation and desired state ports."""
+        if not self.plant.is_finalized():
+            # Drake's list is empty until then, and joints would be missing without a word.
+            raise SimulationError("actuators: the plant is not finalized; accepted: after plant.Finalize()")
         return [
             self.plant.get_joint_actuator(index) for index in self.plant.GetJointActuatorIndices(self.model_instance)
         ]
@@ -181,24 +182,26 @@ class RobotModel:
     @property
     def body_position_index(self) -> int:
         """Where the body's quaternion and position start in the robot's positions."""
-        return int(self.body.floating_positions_start()) - self._first_position
+        self._require_floating("body_position_index")
+        return self._positions.index(int(self.body.floating_positions_start()))
 
     @property
     def body_velocity_index(self) -> int:
         """Where the body's angular and linear velocity start in the robot's velocities."""
-        return int(self.body.floating_velocities_start_in_v()) - self._first_velocity
+        self._require_floating("body_velocity_index")
+        return self._velocities.index(int(self.body.floating_velocities_start_in_v()))
 
     def position_index(self, joint: RevoluteJoint) -> int:
         """Index of a joint's angle in the robot's positions."""
-        return int(joint.position_start()) - self._first_position
+        return self._positions.index(int(joint.position_start()))
 
     def velocity_index(self, joint: RevoluteJoint) -> int:
         """Index of a joint's rate in the robot's velocities."""
-        return int(joint.velocity_start()) - self._first_velocity
+        return self._velocities.index(int(joint.velocity_start()))
 
     def start_in(self, posture: str) -> None:
         """Makes a posture, on level ground, the one in which contexts start; before the plant is finalized."""
-        place = RigidTransform([0.0, 0.0, _standing_height(self.robot, posture)])
+        place = RigidTransform([0.0, 0.0, standing_height(self.robot, posture)])
         self.plant.SetDefaultFloatingBaseBodyPose(self.body, place)
         for leg in self.robot.legs:
             for joint, angle in zip(self.leg_joints(leg), leg.posture(posture), strict=True):
@@ -210,8 +213,9 @@ class RobotModel:
         Legs take a posture, by default the first.
 
         Raises:
-            SimulationError: the robot has no such posture.
+            SimulationError: the robot has no such posture, or its body is not free.
         """
+        self._require_floating("set_pose")
         postures = [standing.name for standing in self.robot.standing]
         if posture is not None and posture not in postures:
             raise SimulationError(f"set_pose: posture = {posture!r}: accepted: {', '.join(postures) or 'None'}")
@@ -221,110 +225,35 @@ class RobotModel:
                 self.leg_joints(leg), leg.posture(posture or self.robot.standing[0].name), strict=True
             ):
                 joint.set_angle(context, angle)
-        pose = RigidTransform(RollPitchYaw(0.0, 0.0, yaw), [x, y, _standing_height(self.robot, posture)])
+        pose = RigidTransform(RollPitchYaw(0.0, 0.0, yaw), [x, y, standing_height(self.robot, posture)])
         self.plant.SetFreeBodyPose(context, self.body, pose)
 
-    @property
-    def _first_position(self) -> int:
-        return min(self.plant.get_joint(i).position_start() for i in self._joints) if self._joints else 0
+    def _require_floating(self, what: str) -> None:
+        if not self.body.is_floating_base_body():
+            raise SimulationError(
+                f"{what}: the body of {self.plant.GetModelInstanceName(self.model_instance)} is not free, but fixed to "
+                "another; accepted: a robot that others are welded onto, WeldFrames(model.body.body_frame(), other)"
+            )
 
     @property
-    def _first_velocity(self) -> int:
-        return min(self.plant.get_joint(i).velocity_start() for i in self._joints) if self._joints else 0
+    def _positions(self) -> list[int]:
+        """Which of the plant's positions are the robot's; those of a model on its fork or leg lie between them."""
+        every = np.arange(self.plant.num_positions(), dtype=np.float64)
+        return self.plant.GetPositionsFromArray(self.model_instance, every).astype(int).tolist()
 
     @property
-    def _joints(self) -> list[JointIndex]:
-        """Joints with coordinates, the body's free one included; a model's coordinates follow each other."""
-        indices = self.plant.GetJointIndices(self.model_instance)
-        return [i for i in indices if self.plant.get_joint(i).num_velocities()]
+    def _velocities(self) -> list[int]:
+        """Which of the plant's velocities are the robot's."""
+        every = np.arange(self.plant.num_velocities(), dtype=np.float64)
+        return self.plant.GetVelocitiesFromArray(self.model_instance, every).astype(int).tolist()
 
     def _joint(self, name: str) -> RevoluteJoint:
         return self.plant.GetJointByName(name, self.model_instance)
 
 
-def add_robot(
-    plant: MultibodyPlant,
-    robot: Robot | str | Path | Mapping[str, Any],
-    *,
-    gains: ServoGains | None = None,
-    roller_model: Literal["full", "windowed"] = "full",
-    builder: DiagramBuilder | None = None,
-    window_size: int = DEFAULT_SIZE,
-    visuals: bool = True,
-) -> RobotModel:
-    """Adds a robot to a plant that is not finalized, standing on z = 0, servo gains set.
-
-    With `roller_model="windowed"` only the rollers near the ground are simulated, which is faster, the more so the more
-    rollers the wheels have. Then call `follow_rollers(simulator)` before the simulation. The ground must touch the
-    wheels at the bottom, as it does on planes and low bumps; beside walls and on robots that tip, use "full".
-
-    Args:
-        plant: The plant.
-        robot: Robot, name of a shipped one, or path to a robot.yaml.
-        gains: Gains of the servos; by default those of `servo_gains(robot)`. A driven wheel that is missing in
-            `drive_damping` has no servo: its torque comes from the plant's actuation port.
-        roller_model: Which rollers are simulated.
-        builder: The builder of the plant's diagram; needed for windowed rollers, for the system that remembers them.
-        window_size: Number of simulated rollers a wheel, from 2; wheels with as many or fewer are simulated in full.
-        visuals: Whether the robot shall be seen; a step is a little faster without.
-
-    Raises:
-        SimulationError: windowed rollers without a builder, or in a plant with continuous time.
-    """
-    robot = load_robot(robot)
-    if roller_model not in ("full", "windowed"):
-        raise SimulationError(f"add_robot: roller_model = {roller_model!r}: accepted: 'full', 'windowed'")
-    windows = _windows(robot, plant, builder, window_size) if roller_model == "windowed" and robot.wheels else {}
-    parser = Parser(plant)
-    parser.SetAutoRenaming(True)
-    (instance,) = parser.AddModelsFromString(robot_to_sdf(robot, windows, visuals=visuals), "sdf")
-    body = plant.GetBodyByName(names.BODY, instance)
-    roller_window = None
-    if windows and builder is not None:
-        wheels = [_windowed_wheel(plant, instance, window) for window in windows.values()]
-        roller_window = builder.AddSystem(RollerWindow(plant, wheels, robot.name))
-        roller_window.set_name(f"{plant.GetModelInstanceName(instance)}_rollers")
-    model = RobotModel(robot=robot, plant=plant, model_instance=instance, body=body, roller_window=roller_window)
-    if robot.legs:
-        model.start_in(robot.standing[0].name)
-    else:
-        plant.SetDefaultFloatingBaseBodyPose(body, RigidTransform([0.0, 0.0, _standing_height(robot)]))
-    set_gains(plant, instance, robot, gains or servo_gains(robot))
-    return model
-
-
-def _standing_height(robot: Robot, posture: str | None = None) -> float:
+def standing_height(robot: Robot, posture: str | None = None) -> float:
     """Height of Bo above level ground, sunk in by what the weight does [m]."""
     ground = robot.ground_height
     if robot.legs:
         ground = min(foot[2] - leg.wheel.radius for foot, leg in zip(robot.feet_B(posture), robot.legs, strict=True))
     return -float(ground) - static_penetration(robot)
-
-
-def _windows(
-    robot: Robot, plant: MultibodyPlant, builder: DiagramBuilder | None, window_size: int
-) -> dict[str, Window]:
-    if builder is None:
-        raise SimulationError(
-            "add_robot: windowed rollers need a system that remembers the others; accepted: builder=, the "
-            "DiagramBuilder of the plant, or roller_model='full'"
-        )
-    if plant.time_step() <= 0:
-        raise SimulationError(
-            "add_robot: windowed rollers are for discrete plants; accepted: a positive time step, or "
-            "roller_model='full'"
-        )
-    if not isinstance(window_size, int) or window_size < 2:
-        raise SimulationError(f"add_robot: window_size = {window_size}: accepted: a whole number, 2 or more")
-    return windows(robot, window_size)
-
-
-def _windowed_wheel(plant: MultibodyPlant, instance: ModelInstanceIndex, window: Window) -> WindowedWheel:
-    name = window.wheel.name
-    slots = [plant.GetJointByName(names.roller_joint(name, slot), instance) for slot in range(window.size)]
-    return WindowedWheel(
-        window=window,
-        body=plant.GetBodyByName(names.BODY, instance),
-        drive=plant.GetJointByName(names.drive_joint(name), instance),
-        slots=slots,
-    )
