@@ -17,7 +17,6 @@ from scipy.linalg import null_space
 import rollerbench as rb
 
 FirstOrderHold = PiecewisePolynomial.FirstOrderHold
-TWIST_PORT, POSE_PORT = "v_xyw_B", "q_xyt"  # of the station
 PARK, CROSS = np.array([0.0, 1.0, 0.0]), np.array([3.0, 3.0, 0.0])
 POST, KNOTS = 0.1, 31  # radius of a post [m]; times at which a plan has its wheel speeds
 
@@ -70,11 +69,11 @@ def simulated_pose(robot: rb.Robot, speeds: PiecewisePolynomial) -> np.ndarray:
     station = builder.AddSystem(rb.build_station(rb.load_scenario(scenario), command="external"))
     twists = FirstOrderHold(breaks, rb.WheelKinematics(robot).forward_matrix @ speeds.vector_values(breaks))
     source = builder.AddSystem(TrajectorySource(twists))  # the station makes them the same wheel speeds again
-    builder.Connect(source.get_output_port(), station.GetInputPort(TWIST_PORT))
+    builder.Connect(source.get_output_port(), station.GetInputPort("twist_command"))
     simulator = Simulator(builder.Build())
     rb.follow_rollers(simulator)
     simulator.AdvanceTo(end)
-    return station.GetOutputPort(POSE_PORT).Eval(station.GetMyContextFromRoot(simulator.get_context()))
+    return station.GetOutputPort("pose").Eval(station.GetMyContextFromRoot(simulator.get_context()))
 
 
 def main() -> None:

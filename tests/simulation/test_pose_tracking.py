@@ -1,7 +1,6 @@
 """Closed loops with imperfect robots: how far from the reference they are, where open loops are far off."""
 
 import numpy as np
-import pytest
 
 import rollerbench as rb
 

@@ -1,5 +1,7 @@
 """The station as a part of other diagrams: its ports, and what comes in and out of them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -113,8 +115,11 @@ def test_a_reference_from_outside_is_tracked_as_one_of_the_scenario() -> None:
     builder = DiagramBuilder()
     station = builder.AddSystem(rb.build_station(each, command="external"))
     reference = builder.AddSystem(rb.systems.ReferenceSource(each.motion.twist))
+    # The scenario's feed-forward is half a period of control ahead, as it is held for one.
+    twist = replace(each.motion.twist, breaks=each.motion.twist.breaks - 0.5 * each.tracking.period)
+    ahead = builder.AddSystem(rb.systems.ReferenceSource(twist))
     builder.Connect(reference.GetOutputPort("q_xyt"), station.GetInputPort("reference_pose"))
-    builder.Connect(reference.GetOutputPort("v_xyw_B"), station.GetInputPort("reference_twist"))
+    builder.Connect(ahead.GetOutputPort("v_xyw_B"), station.GetInputPort("reference_twist"))
     simulator, context = started(builder.Build())
     simulator.AdvanceTo(0.6)
     assert_allclose(station.GetOutputPort("pose").Eval(station.GetMyContextFromRoot(context)), expected, atol=1e-12)

@@ -32,12 +32,16 @@ ALGEBRAIC: dict[str, Callable[[], Diagram]] = {
     "KinematicBase, by twist": lambda: systems.KinematicBase("swerve_base", command="v_xyw_B"),
     "WheelSpeedController": lambda: systems.WheelSpeedController("youbot_base", DT, [PidGains(kp=1, ki=4, kd=0.1)] * 4),
     "Drivetrain": lambda: systems.Drivetrain(DRIVES, DT),
+    "TwistLimiter": lambda: systems.TwistLimiter("youbot_base", DT, max_wheel_acceleration=20.0),
+    "PoseTracker": lambda: systems.PoseTracker("differential_cart"),
 }
 
 NUMERIC = {
     *("SlipMonitor", "RollResistance"),  # read the plant's contacts
     *("GaitPlanner", "LegInverseKinematics", "LegTracker", "LegWatch", "StanceOdometry", "BodyPoseController"),
     "LegServo",  # its switch for lost legs is written in Python
+    "ReferenceSource",  # Drake's TrajectorySource converts from floats only
+    *("SteeringKinematics", "SteeredOdometry", "PoseEstimator", "GyroSensor", "PoseFixSensor"),
 }
 """Systems that are of float by nature: they branch, iterate or read what Drake has for floats only."""
 
