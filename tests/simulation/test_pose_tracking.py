@@ -32,3 +32,14 @@ def errors(robot, errors, controller, command=EIGHT, duration=24.5):
     off = result.recording.q_xyt - result.recording.reference_q_xyt
     turn = (off[:, 2] + np.pi) % (2 * np.pi) - np.pi
     return np.hypot(off[:, 0], off[:, 1]), np.abs(turn), result
+
+
+def test_feedback_keeps_an_imperfect_robot_on_its_eight() -> None:
+    distance, angle, result = errors("youbot_base", YOUBOT, {"type": "pose_tracking"})
+    assert distance.max() < 0.010
+    assert np.degrees(angle.max()) < 0.5
+    # What the feedback did is part of the budget, which still adds up.
+    budget = rb.error_budget(result.recording)
+    assert np.abs(budget.parts["feedback"][-1, :2]).max() > 0.02
+    off = result.recording.q_xyt - result.recording.reference_q_xyt
+    assert np.abs(budget.total[-1, :2] - off[-1, :2]).max() < 1e-9
