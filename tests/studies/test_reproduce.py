@@ -11,10 +11,16 @@ import pytest
 
 import rollerbench as rb
 from budgets import assert_parts_add_up
-from rollerbench.studies import Reproduction, paper_names, reproduce
+from rollerbench.studies import Reproduction, omni_runs, paper_names, reproduce
 from rollerbench.studies.differential_drive import gear_path, half_track, offset, with_gamma
 from rollerbench.studies.mecanum import TABLE_1, WHEELS, body_twist
 from rollerbench.studies.six_wheel import TABLE_1_ERRORS, TABLE_1_POINTS
+
+
+@pytest.fixture(autouse=True)
+def _no_figures_of_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What a run draws of itself is seen in test_run.py; for a hundred runs it would take as long as simulating."""
+    monkeypatch.setattr("rollerbench.simulation.folder.run_figures", lambda recording: {})
 
 
 def reproduced(name: str, folder: Path) -> Reproduction:
@@ -186,8 +192,11 @@ def test_mecanum(tmp_path: Path) -> None:
     assert violation > 0.1 > 1e-12 > none
 
 
-def test_omni_anisotropy(tmp_path: Path) -> None:
+def test_omni_anisotropy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Leng and Cao (2007): what takes simulation, figures 11 and 12; test_omni_anisotropy.py has the theory."""
+    # The speeds are the same when the robot turns to the next direction sooner.
+    monkeypatch.setattr(omni_runs, "CHANGE", 0.6)
+    monkeypatch.setattr(omni_runs, "STEADY", 0.3)
     done = reproduced("omni_anisotropy", tmp_path)
     numbers = ("04", "07", "08", "11", "12")
     assert {p.name for p in done.findings.pictures} == {"section_3_3", *(f"figure_{n}" for n in numbers)}
