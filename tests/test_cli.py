@@ -13,7 +13,6 @@ import robots
 from rollerbench.cli import main
 from rollerbench.resources import robot_names, scenario_files
 
-
 Command = Callable[..., subprocess.CompletedProcess[str]]
 
 

@@ -11,16 +11,13 @@ import pytest
 
 import rollerbench as rb
 from budgets import assert_parts_add_up
-from rollerbench.studies import Reproduction, omni_runs, paper_names, reproduce
+from motions import assert_translation, assert_turn
+from rollerbench.studies import Reproduction, paper_names, reproduce
 from rollerbench.studies.differential_drive import gear_path, half_track, offset, with_gamma
 from rollerbench.studies.mecanum import TABLE_1, WHEELS, body_twist
 from rollerbench.studies.six_wheel import TABLE_1_ERRORS, TABLE_1_POINTS
 
-
-@pytest.fixture(autouse=True)
-def _no_figures_of_runs(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What a run draws of itself is seen in test_run.py; for a hundred runs it would take as long as simulating."""
-    monkeypatch.setattr("rollerbench.simulation.folder.run_figures", lambda recording: {})
+pytestmark = pytest.mark.usefixtures("undrawn")
 
 
 def reproduced(name: str, folder: Path) -> Reproduction:
@@ -160,6 +157,10 @@ def test_mecanum(tmp_path: Path) -> None:
     """Huai and Jin (2022): table 1, ten motions, closed trajectory of 100 s."""
     done = reproduced("mecanum", tmp_path)
     assert {"figure_06", "figure_07"} <= {p.name for p in done.findings.pictures}
+    motions = {name: run for name, run in done.runs.items() if name.startswith("mecanum_")}
+    assert len(motions) == 10
+    for name, run in motions.items():
+        (assert_turn if "turn" in name else assert_translation)(run)
     table = rows(done, "Table 1")
     assert len(table) == 40
     for result in table:
@@ -192,11 +193,8 @@ def test_mecanum(tmp_path: Path) -> None:
     assert violation > 0.1 > 1e-12 > none
 
 
-def test_omni_anisotropy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_omni_anisotropy(tmp_path: Path) -> None:
     """Leng and Cao (2007): what takes simulation, figures 11 and 12; test_omni_anisotropy.py has the theory."""
-    # The speeds are the same when the robot turns to the next direction sooner.
-    monkeypatch.setattr(omni_runs, "CHANGE", 0.6)
-    monkeypatch.setattr(omni_runs, "STEADY", 0.3)
     done = reproduced("omni_anisotropy", tmp_path)
     numbers = ("04", "07", "08", "11", "12")
     assert {p.name for p in done.findings.pictures} == {"section_3_3", *(f"figure_{n}" for n in numbers)}

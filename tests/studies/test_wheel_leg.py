@@ -176,13 +176,11 @@ def shorter(name: str) -> rb.Scenario:
     return rb.load_scenario(name, overrides={"duration": 3.0, "command.pieces": [{**walk, "duration": 3.0}]})
 
 
-@pytest.mark.usefixtures("_planned_once")
+@pytest.mark.usefixtures("_planned_once", "undrawn")
 def test_wheel_leg(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The whole reproduction, with the first seconds of the walks as far as they are shipped."""
     paper = replace(PAPERS["wheel_leg"], scenarios=lambda: {name: shorter(name) for name in leg_walks.scenarios()})
     monkeypatch.setitem(PAPERS, "wheel_leg", paper)
-    # What a run of legs draws of itself is seen in test_leg_runs.py.
-    monkeypatch.setattr("rollerbench.simulation.folder.run_figures", lambda recording: {})
     done = reproduce("wheel_leg", output=tmp_path / "wheel_leg", recordings=False)
     assert set(done.runs) == set(leg_walks.WALKS) & set(scenario_files())
     page = (tmp_path / "wheel_leg" / "report.html").read_text()
