@@ -126,6 +126,7 @@ def test_half_the_step_is_tried_on_request() -> None:
     assert [change["x"], change["y"]] == pytest.approx([-0.5 * rest["x"], -0.5 * rest["y"]], rel=0.3)
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_stored_recording_gives_the_same_budget_without_drake(tmp_path: Path) -> None:
     errors = {"radius_scale": {"front_left": 1.02}}
     result = rb.run({**LATERAL, "errors": errors}, output=tmp_path / "run")

@@ -1,6 +1,7 @@
 """Windowed rollers are the same robot: same motion, same mass, same looks; and nothing goes wrong silently."""
 
 from collections.abc import Iterator
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -34,6 +35,12 @@ def scenario(robot: Any, v_xyw_B: list[float], **plant: Any) -> rb.Scenario:
     return rb.load_scenario(content)
 
 
+@cache
+def ran(count: int, motion: str, model: str) -> Any:
+    """A run of a robot on Mecanum wheels, in one of the motions, with all rollers or those near the ground."""
+    return simulate(scenario(mecanum(count), MOTIONS[motion], roller_model=model))
+
+
 def apart(first: Any, second: Any) -> float:
     """How far two recordings end apart, over the way that they went, or over the turn, whichever is more [-]."""
     way, turn = (np.abs(np.diff(first.q_xyt, axis=0)) @ weights for weights in ([1, 1, 0], [0, 0, 1]))
@@ -45,7 +52,7 @@ def apart(first: Any, second: Any) -> float:
 @pytest.mark.parametrize("motion", MOTIONS)
 @pytest.mark.parametrize("count", SMALL_ROLLERS)
 def test_windowed_mecanum_wheels_move_the_robot_as_full_ones_do(count: int, motion: str) -> None:
-    runs = [simulate(scenario(mecanum(count), MOTIONS[motion], roller_model=model)) for model in ("full", "windowed")]
+    runs = [ran(count, motion, model) for model in ("full", "windowed")]
     assert [run.failure for run in runs] == [None, None]
     assert apart(*(run.recording for run in runs)) < 2e-4
     first = runs[1].recording.wheels("first_roller")
@@ -63,7 +70,7 @@ def test_so_do_double_row_omni_wheels(motion: str) -> None:
 def test_the_size_of_the_window_does_not_matter(size: int) -> None:
     plant = {"roller_model": "windowed", "roller_window": size}
     windowed = simulate(scenario(mecanum(12), MOTIONS["combined"], **plant)).recording
-    full = simulate(scenario(mecanum(12), MOTIONS["combined"], roller_model="full")).recording
+    full = ran(12, "combined", "full").recording
     assert apart(full, windowed) < 2e-5
 
 
@@ -75,10 +82,7 @@ def test_a_window_of_all_rollers_is_the_full_model() -> None:
 
 
 def test_recordings_agree_column_by_column() -> None:
-    full, windowed = (
-        simulate(scenario(mecanum(12), MOTIONS["combined"], roller_model=model)).recording
-        for model in ("full", "windowed")
-    )
+    full, windowed = (ran(12, "combined", model).recording for model in ("full", "windowed"))
     for column in ("angle", "speed", "effort", "contact_x", "contact_y", "depth", "slip_x", "slip_y", "drive_y"):
         one, other = full.wheels(column), windowed.wheels(column)
         assert np.sqrt(np.mean((one - other) ** 2)) < 2e-3 * np.sqrt(np.mean(one**2)), column
@@ -86,10 +90,7 @@ def test_recordings_agree_column_by_column() -> None:
 
 def test_rollers_that_are_not_simulated_are_remembered() -> None:
     """While the robot turns and speeds up, the speeds of all rollers follow those of the full model."""
-    full, windowed = (
-        simulate(scenario(mecanum(12), MOTIONS["combined"], roller_model=model)).recording
-        for model in ("full", "windowed")
-    )
+    full, windowed = (ran(12, "combined", model).recording for model in ("full", "windowed"))
     names = [f"fl.roller_{k:02d}" for k in range(12)]
     truth, remembered = (np.column_stack([r.columns[name] for name in names]) for r in (full, windowed))
     assert np.sqrt(np.mean((truth - remembered) ** 2)) < 0.03 * np.sqrt(np.mean(truth**2))

@@ -18,6 +18,7 @@ ROUGH: dict[str, Any] = {
 }
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_the_seed_makes_the_ground(tmp_path: Path) -> None:
     first = rb.run(ROUGH, output=tmp_path / "first")
     assert first.folder is not None

@@ -42,6 +42,7 @@ def test_projection_leaves_steered_wheels_free() -> None:
     assert motion.steering_angles(1.0) == pytest.approx([math.atan2(-0.3 * 0.3, 0.5)], abs=1e-9)
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_file_of_the_user_is_never_deleted(tmp_path: Path) -> None:
     rb.run({**BASE, "duration": 1.2}, output=tmp_path / "run")
     (tmp_path / "run" / "notes.txt").write_text("precious")

@@ -7,6 +7,7 @@ import pytest
 
 import robots
 import rollerbench as rb
+from rollerbench.report.figures import run_figures
 from rollerbench.simulation.scenario import load_scenario
 
 Data = dict[str, Any]
@@ -46,6 +47,9 @@ def test_the_hexapod_stands_where_it_was_put() -> None:
     assert legs["tilt_error"] < 0.1 * DEGREE
     assert off_course(recording) < 0.1 * MILLIMETRE
     assert legs["steps"] == 0
+    figures = run_figures(recording)
+    assert set(figures) == {"trajectory", "pose_error", "body", "gait", "feet", "joint_efforts"}
+    assert all(len(svg) > 1000 for svg in figures.values())
 
 
 def test_an_insect_walks_with_the_tripod_gait() -> None:

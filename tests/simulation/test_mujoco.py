@@ -116,6 +116,7 @@ def test_slope_friction_and_effort_limits_count() -> None:
     assert np.nanmax(np.abs(recording.recording.columns[f"{weak['wheels'][0]['name']}.effort"])) <= 0.01 + 1e-9
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_cross_check_that_fails_keeps_the_first_run(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     def cannot(*_: object) -> None:
         raise rb.SimulationError("it cannot stand")
@@ -127,6 +128,7 @@ def test_a_cross_check_that_fails_keeps_the_first_run(monkeypatch: pytest.Monkey
     assert rb.Recording.read(tmp_path / "run").time[-1] == pytest.approx(1.0)
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_an_interrupted_cross_check_says_so(tmp_path: Path) -> None:
     seen: list[float] = []
 
@@ -141,6 +143,7 @@ def test_an_interrupted_cross_check_says_so(tmp_path: Path) -> None:
     assert caught.value.result.summary["status"] == "ok"
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_run_folder_repeats_itself(tmp_path: Path) -> None:
     first = rb.run({**SHORT, "engine": "both"}, output=tmp_path / "first")
     again = rb.run(tmp_path / "first" / "scenario.yaml", output=tmp_path / "again")

@@ -57,7 +57,7 @@ def test_pose_error_agrees_with_an_independent_computation(folder: Path) -> None
     summary = json.loads((folder / "summary.json").read_text())
     # The reference, by brute force: the ramped twist integrated in small Euler steps.
     x = y = yaw = length = 0.0
-    n = 200_000
+    n = 20_000
     vx, vy, w = TURNING["command"]["v_xyw_B"]  # type: ignore[index]
     for i in range(n):
         t = (i + 0.5) / n
@@ -96,6 +96,7 @@ def test_summary_has_the_keys_of_the_contract(folder: Path) -> None:
     assert summary["realtime_factor"] == pytest.approx(summary["duration"] / summary["wall_time"])
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_the_folder_reproduces_itself_to_the_bit(folder: Path, tmp_path: Path) -> None:
     again = rb.run(folder / "scenario.yaml", output=tmp_path / "again")
     assert again.folder is not None
@@ -162,8 +163,10 @@ def test_wheel_speeds_command_and_pose_by_forward_kinematics() -> None:
         (robots.mixed, [0.3, 0.0, 0.0]),
     ],
 )
-def test_any_robot_runs(make: Any, v_xyw_B: list[float], tmp_path: Path) -> None:
+def test_any_robot_runs(make: Any, v_xyw_B: list[float], tmp_path: Path, request: pytest.FixtureRequest) -> None:
     """A robot.yaml of the user's own, of any wheel types, beside its scenario."""
+    if make is not robots.mixed:
+        request.getfixturevalue("undrawn")
     (tmp_path / "mine").mkdir()
     with (tmp_path / "mine" / "robot.yaml").open("w") as stream:
         YAML().dump(make(), stream)
@@ -196,6 +199,7 @@ def _tall(data: robots.Data) -> robots.Data:
     return data
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_robot_that_tips_over_fails_and_keeps_what_was_computed(tmp_path: Path) -> None:
     scenario = {
         **TURNING,
@@ -238,6 +242,7 @@ def test_a_state_that_is_not_finite_fails(monkeypatch: pytest.MonkeyPatch) -> No
     assert recording.time[-1] == pytest.approx(0.55, abs=0.011)
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_an_interrupt_keeps_what_was_computed(tmp_path: Path) -> None:
     def stop(now: float) -> None:
         if now > 0.4:
@@ -257,6 +262,7 @@ def test_a_foreign_folder_is_never_overwritten(tmp_path: Path) -> None:
     assert (tmp_path / "thesis.tex").read_text() == "precious"
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_an_earlier_run_is_replaced_whole(tmp_path: Path) -> None:
     rb.run({**TURNING, "duration": 0.5, "recording": {"html": True}}, output=tmp_path / "run")
     rb.run({**TURNING, "duration": 0.5}, output=tmp_path / "run")

@@ -11,10 +11,13 @@ import pytest
 
 import rollerbench as rb
 from budgets import assert_parts_add_up
+from motions import assert_translation, assert_turn
 from rollerbench.studies import Reproduction, paper_names, reproduce
 from rollerbench.studies.differential_drive import gear_path, half_track, offset, with_gamma
 from rollerbench.studies.mecanum import TABLE_1, WHEELS, body_twist
 from rollerbench.studies.six_wheel import TABLE_1_ERRORS, TABLE_1_POINTS
+
+pytestmark = pytest.mark.usefixtures("undrawn")
 
 
 def reproduced(name: str, folder: Path) -> Reproduction:
@@ -154,6 +157,10 @@ def test_mecanum(tmp_path: Path) -> None:
     """Huai and Jin (2022): table 1, ten motions, closed trajectory of 100 s."""
     done = reproduced("mecanum", tmp_path)
     assert {"figure_06", "figure_07"} <= {p.name for p in done.findings.pictures}
+    motions = {name: run for name, run in done.runs.items() if name.startswith("mecanum_")}
+    assert len(motions) == 10
+    for name, run in motions.items():
+        (assert_turn if "turn" in name else assert_translation)(run)
     table = rows(done, "Table 1")
     assert len(table) == 40
     for result in table:

@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -14,11 +15,24 @@ from rollerbench.kinematics.gaits.planner import START_SHARE
 from rollerbench.resources import scenario_files
 from rollerbench.studies import leg_support, leg_walks, reproduce, song, wheel_leg
 from rollerbench.studies.paper import Findings
+from rollerbench.studies.reproduce import PAPERS
 
 
 @pytest.fixture(scope="module")
 def findings() -> Findings:
     return wheel_leg.theory()
+
+
+@pytest.fixture(scope="module")
+def plans() -> dict[str, leg_walks.PlannedWalk]:
+    robot = rb.load_robot("wheel_leg_hexapod")
+    return {name: leg_walks.planned(walk, robot) for name, walk in leg_walks.WALKS.items()}
+
+
+@pytest.fixture
+def _planned_once(plans: dict[str, leg_walks.PlannedWalk], monkeypatch: pytest.MonkeyPatch) -> None:
+    by_figure = {walk.figure: plans[name] for name, walk in leg_walks.WALKS.items()}
+    monkeypatch.setattr(leg_walks, "planned", lambda walk, robot: by_figure[walk.figure])
 
 
 def row(findings: Findings, item: str, quantity: str) -> Any:
@@ -125,9 +139,8 @@ def test_the_circumcentre_is_ill_conditioned(findings: Findings) -> None:
 
 
 @pytest.mark.parametrize("name", list(leg_walks.WALKS))
-def test_planned_walks(name: str) -> None:
-    walk = leg_walks.WALKS[name]
-    plan = leg_walks.planned(walk, rb.load_robot("wheel_leg_hexapod"))
+def test_planned_walks(name: str, plans: dict[str, leg_walks.PlannedWalk]) -> None:
+    walk, plan = leg_walks.WALKS[name], plans[name]
     # The twist takes START_SHARE of a period of 1 s to come up, evenly on both sides of the middle.
     assert plan.q_xyt[-1] == pytest.approx([walk.speed * (leg_walks.DURATION - 0.5 * START_SHARE), 0.0, 0.0], abs=1e-3)
     assert plan.on_ground.sum(axis=1).min() >= 3
@@ -139,6 +152,7 @@ def test_planned_walks(name: str) -> None:
     assert np.linalg.norm(np.diff(plan.feet, axis=0), axis=2)[both].max() < 1e-6
 
 
+@pytest.mark.usefixtures("_planned_once")
 def test_a_simulated_walk_is_held_against_its_reference() -> None:
     name, time = "hexapod_mammal_walk", np.linspace(0.0, 5.0, 51)
     columns = dict.fromkeys(("y", "roll", "pitch", "yaw", "reference_y", "reference_yaw"), np.zeros(51))
@@ -156,8 +170,17 @@ def test_a_simulated_walk_is_held_against_its_reference() -> None:
     assert [p.name for p in pictures] == ["figure_08b", "figure_08b_body"]
 
 
-def test_wheel_leg(tmp_path: Path) -> None:
-    """The whole reproduction, with the walks as far as they are shipped."""
+def shorter(name: str) -> rb.Scenario:
+    """A shipped walk of three seconds, without the rest after it."""
+    (walk, *_) = rb.load_scenario(name).model_dump(mode="json")["command"]["pieces"]
+    return rb.load_scenario(name, overrides={"duration": 3.0, "command.pieces": [{**walk, "duration": 3.0}]})
+
+
+@pytest.mark.usefixtures("_planned_once", "undrawn")
+def test_wheel_leg(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The whole reproduction, with the first seconds of the walks as far as they are shipped."""
+    paper = replace(PAPERS["wheel_leg"], scenarios=lambda: {name: shorter(name) for name in leg_walks.scenarios()})
+    monkeypatch.setitem(PAPERS, "wheel_leg", paper)
     done = reproduce("wheel_leg", output=tmp_path / "wheel_leg", recordings=False)
     assert set(done.runs) == set(leg_walks.WALKS) & set(scenario_files())
     page = (tmp_path / "wheel_leg" / "report.html").read_text()

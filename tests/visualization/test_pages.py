@@ -23,24 +23,7 @@ def _pixels(png: bytes) -> np.ndarray:
     return matplotlib.image.imread(io.BytesIO(png), format="png")[..., :3]
 
 
-def test_the_recording_shows_robot_and_ground_without_a_request(folder: Path) -> None:
-    with opened(folder / "recording.html") as watched:
-        watched.page.wait_for_function("viewer.animator.duration > 0")
-        watched.page.wait_for_timeout(1000)
-        start = _pixels(watched.page.screenshot())
-        assert watched.requests == []
-        assert watched.errors == []
-    red, _, blue = np.moveaxis(start, -1, 0)
-    # The robot's body is the only saturated blue; the ground is nearly grey and fills the lower edge.
-    body = (blue > 0.4) & (blue - red > 0.25)
-    assert 0.002 < body.mean() < 0.3
-    ground = start[-200:]
-    assert (np.ptp(ground, axis=-1) < 0.15).mean() > 0.8
-    assert ground.std() > 0.005  # grid lines
-    assert len(np.unique((start * 16).astype(int).reshape(-1, 3), axis=0)) > 20
-
-
-def test_the_recording_moves(folder: Path) -> None:
+def test_the_recording_shows_robot_and_ground_without_a_request_and_moves(folder: Path) -> None:
     """The animation lasts as long as the run, and the robot is elsewhere at its end."""
     with opened(folder / "recording.html") as watched:
         page = watched.page
@@ -51,15 +34,27 @@ def test_the_recording_moves(folder: Path) -> None:
             page.evaluate(f"viewer.animator.pause(); viewer.animator.seek({time})")
             page.wait_for_timeout(500)
             shots.append(_pixels(page.screenshot()))
-    assert np.abs(shots[0] - shots[1]).max() > 0.2
-
-
-@pytest.mark.parametrize("width", [360, 1000])
-def test_the_report_reads_on_phone_and_desk(folder: Path, width: int) -> None:
-    with opened(folder / "report.html", width=width) as watched:
         assert watched.requests == []
         assert watched.errors == []
-        assert watched.page.locator("figure svg").count() == 5
-        assert "Position error" in watched.page.inner_text("body")
-        overflow = watched.page.evaluate("document.documentElement.scrollWidth - window.innerWidth")
-        assert overflow <= 0
+    start, end = shots
+    red, _, blue = np.moveaxis(start, -1, 0)
+    # The robot's body is the only saturated blue; the ground is nearly grey and fills the lower edge.
+    body = (blue > 0.4) & (blue - red > 0.25)
+    assert 0.002 < body.mean() < 0.3
+    ground = start[-200:]
+    assert (np.ptp(ground, axis=-1) < 0.15).mean() > 0.8
+    assert ground.std() > 0.005  # grid lines
+    assert len(np.unique((start * 16).astype(int).reshape(-1, 3), axis=0)) > 20
+    assert np.abs(start - end).max() > 0.2
+
+
+def test_the_report_reads_on_phone_and_desk(folder: Path) -> None:
+    with opened(folder / "report.html") as watched:
+        for width in (360, 1000):
+            watched.page.set_viewport_size({"width": width, "height": 600})
+            assert watched.page.locator("figure svg").count() == 5
+            assert "Position error" in watched.page.inner_text("body")
+            overflow = watched.page.evaluate("document.documentElement.scrollWidth - window.innerWidth")
+            assert overflow <= 0
+        assert watched.requests == []
+        assert watched.errors == []

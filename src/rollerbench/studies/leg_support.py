@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from rollerbench.kinematics.legs import LegKinematics, body_pose_from_circumcenter, body_pose_from_stance
+from rollerbench.kinematics.legs import LegKinematics
+from rollerbench.kinematics.legs.body_pose import circumcenter_pose, least_squares_pose
 from rollerbench.report.drawing import COLORS, Curve, SpaceCurve, curves, space
 from rollerbench.studies import song
 from rollerbench.studies.paper import Picture, Result
@@ -71,8 +72,8 @@ def figure_7() -> tuple[list[Result], list[Picture]]:
         axis=1,
     )
     in_drake = song.feet_in_drake(robot, q)
-    found = {method: np.array([_pose(method, feet, standing) for feet in from_joints]) for method in METHODS}
-    drakes = {method: np.array([_pose(method, feet, standing) for feet in in_drake]) for method in METHODS}
+    found = {method: _poses(method, from_joints, standing) for method in METHODS}
+    drakes = {method: _poses(method, in_drake, standing) for method in METHODS}
     results = [
         Result(item="Figure 7", quantity="largest change of a distance between two feet, of the legs' joints",
                unit="mm", theory=_stretch(from_joints), simulated=_stretch(in_drake)),
@@ -88,10 +89,11 @@ def figure_7() -> tuple[list[Result], list[Picture]]:
     return results, [_mechanism(poses, q), _coordinates(share, poses, drakes["circumcentre"]), _joints(share, q)]
 
 
-def _pose(method: str, p_BF: Array, p_GF: Array) -> Array:
+def _poses(method: str, p_BF: Array, p_GF: Array) -> Array:
+    """Poses X_GB (n, 4, 4) from feet (n, 3, 3) in B that stand at (3, 3) in G."""
     if method == "circumcentre":
-        return body_pose_from_circumcenter(p_BF, p_GF)
-    return body_pose_from_stance(p_BF, p_GF, robust=False).X_WB
+        return circumcenter_pose(p_BF, p_GF)
+    return least_squares_pose(p_BF, p_GF, np.ones(p_BF.shape[:-1]))
 
 
 def _seen(poses: Array, p_GF: Array) -> Array:
@@ -213,13 +215,13 @@ def _noisy_errors(largest_deg: float) -> dict[str, Array]:
     # The body's axes are the ground's: the true pose is a rise of Bo by its height.
     in_body = feet - [0.0, 0.0, HEIGHT]
     points = np.array([[0.0, 0.0, -HEIGHT], [0.0, 0.0, 0.0]])
-    errors: dict[str, list[Array]] = {method: [] for method in METHODS}
-    for noise in np.random.default_rng(SEED).normal(0.0, NOISE, (DRAWS, 3, 3)):
-        for method in METHODS:
-            pose = _pose(method, in_body + noise, feet)
-            placed = points @ pose[:3, :3].T + pose[:3, 3]
-            errors[method].append(np.linalg.norm(placed - points - [0.0, 0.0, HEIGHT], axis=1))
-    return {method: np.array(values) for method, values in errors.items()}
+    noise = np.random.default_rng(SEED).normal(0.0, NOISE, (DRAWS, 3, 3))
+    errors = {}
+    for method in METHODS:
+        poses = _poses(method, in_body + noise, feet)
+        placed = points @ poses[:, :3, :3].swapaxes(1, 2) + poses[:, np.newaxis, :3, 3]
+        errors[method] = np.asarray(np.linalg.norm(placed - points - [0.0, 0.0, HEIGHT], axis=2))
+    return errors
 
 
 def conditioning(errors: Errors) -> tuple[list[Result], Picture]:

@@ -48,19 +48,19 @@ def test_exact_feet_give_the_exact_pose(count, robust) -> None:
 def test_the_foot_that_slipped_is_named(count) -> None:
     rng = np.random.default_rng(count)
     named, off = 0, []
-    for _ in range(1000):
+    for _ in range(300):
         body, world, pose, foot = stance(rng, count, noise=0.001, slip=0.03)
         found = rb.legs.body_pose_from_stance(body, world)
         named += np.flatnonzero(found.slipped).tolist() == [foot]
         off.append(np.linalg.norm(found.X_WB[:3, 3] - pose[:3, 3]))
-    assert named >= 990
+    assert named >= 297
     assert np.median(off) < 0.002  # as if the foot were not there; with it, 5 mm
 
 
 @pytest.mark.parametrize("count", [4, 5, 6])
 def test_no_foot_is_named_without_a_slip(count) -> None:
     rng = np.random.default_rng(10 + count)
-    for _ in range(1000):
+    for _ in range(300):
         body, world, _, _ = stance(rng, count, noise=0.001)
         assert not rb.legs.body_pose_from_stance(body, world).slipped.any()
 

@@ -60,36 +60,36 @@ def body_pose_from_stance(p_BF: ArrayLike, p_WF: ArrayLike, robust: bool = True,
     weights, slipped = np.ones(count), np.zeros(count, dtype=np.bool_)
     if robust and count >= 4:
         weights = _robust_weights(body, world, 0.5 * slip)
-        slipped = _residuals(_fit(body, world, weights), body, world) > slip
+        slipped = _residuals(least_squares_pose(body, world, weights), body, world) > slip
         kept = np.where(slipped, 0.0, weights)
         if _spread(body, kept > 0) > COLLINEAR:
             weights = kept
         else:
             slipped[:] = False
-    pose = _fit(body, world, weights)
+    pose = least_squares_pose(body, world, weights)
     residuals = _residuals(pose, body, world)
     return StancePose(X_WB=pose, residuals=residuals, weights=weights, slipped=slipped)
 
 
 def _robust_weights(body: Array, world: Array, scale: float, iterations: int = 20) -> Array:
     """Weights (k,) of Geman and McClure, once they come to rest."""
-    squares = (_residuals(_fit(body, world, np.ones(len(body))), body, world) / scale) ** 2
+    squares = (_residuals(least_squares_pose(body, world, np.ones(len(body))), body, world) / scale) ** 2
     if np.max(squares) > 1.0:
         others = [row for row in 1.0 - np.eye(len(body)) if _spread(body, row > 0) > COLLINEAR]
         starts = np.vstack([np.ones(len(body)), *others])
-        each = (_residuals(_fit(body, world, starts), body, world) / scale) ** 2
+        each = (_residuals(least_squares_pose(body, world, starts), body, world) / scale) ** 2
         squares = each[np.argmin(np.sum(each / (1.0 + each), axis=1))]
     weights = 1.0 / (1.0 + squares) ** 2
     for _ in range(iterations):
-        squares = (_residuals(_fit(body, world, weights), body, world) / scale) ** 2
+        squares = (_residuals(least_squares_pose(body, world, weights), body, world) / scale) ** 2
         weights, last = 1.0 / (1.0 + squares) ** 2, weights
         if np.max(np.abs(weights - last)) < 1e-6:
             break
     return np.asarray(weights)
 
 
-def _fit(body: Array, world: Array, weights: Array) -> Array:
-    """Poses (..., 4, 4) of least squares with weights (..., k)."""
+def least_squares_pose(body: Array, world: Array, weights: Array) -> Array:
+    """Poses (..., 4, 4) of least squares, from feet (..., k, 3) in the body and in the world, with weights (..., k)."""
     shares = (weights / np.sum(weights, axis=-1, keepdims=True))[..., np.newaxis, :]
     body_mean, world_mean = shares @ body, shares @ world
     u, _, vt = np.linalg.svd(
@@ -121,6 +121,7 @@ def _spread(feet: Array, kept: NDArray[np.bool_]) -> float:
 
 
 def _feet(name: str, feet: ArrayLike) -> Array:
+    """Feet (k, 3), as long as they fix a pose."""
     array = finite(name, feet)
     if array.ndim != 2 or array.shape[1] != 3:
         raise KinematicsError(f"{name} of shape {array.shape}: accepted: (k, 3)")
@@ -150,24 +151,31 @@ def body_pose_from_circumcenter(p_BF: ArrayLike, p_WF: ArrayLike) -> Array:
     body, world = _feet("p_BF", p_BF), _feet("p_WF", p_WF)
     if len(body) != 3 or len(world) != 3:
         raise KinematicsError(f"{len(body)} and {len(world)} feet: accepted: exactly 3")
+    return circumcenter_pose(body, world)
+
+
+def circumcenter_pose(body: Array, world: Array) -> Array:
+    """Poses (..., 4, 4) by the circle's centre, from three feet (..., 3, 3) in the body and in the world."""
     return np.asarray(_circle_frame(world) @ np.linalg.inv(_circle_frame(body)))
 
 
 def _circle_frame(feet: Array) -> Array:
-    """Frame (4, 4) at the centre of the circle through three feet: z its normal, x towards the first foot."""
-    first, second, third = feet
+    """Frames (..., 4, 4) at the centre of the circle through three feet: z its normal, x towards the first foot."""
+    first, second, third = np.moveaxis(feet, -2, 0)
     normal = np.cross(second - first, third - first)
-    planes = np.array([normal, second - first, third - first])
-    offsets = np.array([normal @ first, 0.5 * (second @ second - first @ first), 0.5 * (third @ third - first @ first)])
-    determinants = []
+    planes = np.stack([normal, second - first, third - first], axis=-2)
+    squares = 0.5 * np.sum(feet**2, axis=-1)
+    offsets = np.stack(
+        [np.sum(normal * first, axis=-1), squares[..., 1] - squares[..., 0], squares[..., 2] - squares[..., 0]], axis=-1
+    )
+    center = np.empty_like(first)
     for column in range(3):
         replaced = planes.copy()
-        replaced[:, column] = offsets
-        determinants.append(np.linalg.det(replaced))
-    center = np.array(determinants) / np.linalg.det(planes)
-    z = normal / np.linalg.norm(normal)
-    x = (first - center) / np.linalg.norm(first - center)
-    frame = np.eye(4)
-    frame[:3, :3] = np.column_stack([x, np.cross(z, x), z])
-    frame[:3, 3] = center
+        replaced[..., column] = offsets
+        center[..., column] = np.linalg.det(replaced) / np.linalg.det(planes)
+    z, x = (vector / np.linalg.norm(vector, axis=-1, keepdims=True) for vector in (normal, first - center))
+    frame = np.zeros((*feet.shape[:-2], 4, 4))
+    frame[..., :3, :3] = np.stack([x, np.cross(z, x), z], axis=-1)
+    frame[..., :3, 3] = center
+    frame[..., 3, 3] = 1.0
     return frame
