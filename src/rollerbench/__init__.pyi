@@ -31,6 +31,7 @@ from .kinematics import gaits as gaits
 from .kinematics import legs as legs
 from .kinematics import limits as limits
 from .kinematics import odometry as odometry
+from .kinematics import paths as paths
 from .plant import RobotModel as RobotModel
 from .plant import add_ground as add_ground
 from .plant import add_robot as add_robot

@@ -1,8 +1,8 @@
 """Equations of motion of wheeled bases: wheels, legs, odometry, contacts, limits. Pure numpy and scipy."""
 
-from rollerbench.kinematics import gaits, legs, limits, odometry
+from rollerbench.kinematics import gaits, legs, limits, odometry, paths
 from rollerbench.kinematics.mobility import Mobility
 from rollerbench.kinematics.rows import finite_roller_factor
 from rollerbench.kinematics.wheels import WheelKinematics
 
-__all__ = ["Mobility", "WheelKinematics", "finite_roller_factor", "gaits", "legs", "limits", "odometry"]
+__all__ = ["Mobility", "WheelKinematics", "finite_roller_factor", "gaits", "legs", "limits", "odometry", "paths"]

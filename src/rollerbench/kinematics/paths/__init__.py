@@ -1,0 +1,20 @@
+"""Paths in the plane and speed laws along them: from legs, each from rest to rest, to a body twist over time."""
+
+from rollerbench.kinematics.paths.curves import clothoid, spline
+from rollerbench.kinematics.paths.legs import Leg, arc, figure_eight, leg, line, square, through_waypoints
+from rollerbench.kinematics.paths.speed_laws import SpeedLaw, fastest_duration, twist_along
+
+__all__ = [
+    "Leg",
+    "SpeedLaw",
+    "arc",
+    "clothoid",
+    "fastest_duration",
+    "figure_eight",
+    "leg",
+    "line",
+    "spline",
+    "square",
+    "through_waypoints",
+    "twist_along",
+]
