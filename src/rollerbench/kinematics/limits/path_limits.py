@@ -96,10 +96,7 @@ class PathLimits:
     @cached_property
     def speeds(self) -> dict[str, Array]:
         """Usages (d,) of limits per speed s', by kind."""
-        rows = speed_rows(self.robot)
-        driven = np.abs(self.b @ rows.rows.T) / rows.speeds
-        steered = np.linalg.norm(_at(self.b, rows.places), axis=-1) / rows.steered_speeds
-        found = {"speed": np.concatenate([driven, steered], axis=1)}
+        found = {"speed": speed_usage(self.robot, self.b)}
         swivels = [w for w in self.robot.steered_wheels if getattr(w, "max_steering_speed", None) is not None]
         places = np.array([w.p_BoHo_B[:2] for w in swivels]).reshape(-1, 2)
         limits = np.array([getattr(w, "max_steering_speed", None) for w in swivels], dtype=np.float64)
@@ -152,7 +149,9 @@ class PathLimits:
             w = w + np.einsum("dmik,dk->dmi", self._cones.slope[..., 2:], self._fairest(w))
         size, room = np.hypot(w[..., 1], w[..., 2]), np.maximum(w[..., 0], np.finfo(float).tiny)
         shares = np.minimum(size / room, WORST)
-        return found | {kind: shares[:, self._force_kinds == kind].max(axis=1) for kind in set(self._force_kinds)}
+        return found | {
+            kind: shares[:, self._force_kinds == kind].max(axis=1) for kind in self.kinds if kind not in found
+        }
 
     def _scaled(self, rows: NDArray[np.intp], unit: Array) -> Cones:
         """Cones at some points within the margin, over (u, x) in the units (d, 2)."""
@@ -210,6 +209,14 @@ class PathLimits:
         objective[:, 0] = -1.0
         z, _ = maximize(objective, _joined(Cones(constant=constant, slope=slope), ceiling))
         return z[:, 1:]
+
+
+def speed_usage(robot: Robot, v_xyw_B: Array) -> Array:
+    """Speeds (d, k) of the driven wheels that have a max_speed over it, at twists (d, 3)."""
+    rows = speed_rows(robot)
+    driven = np.abs(v_xyw_B @ rows.rows.T) / rows.speeds
+    steered = np.linalg.norm(_at(v_xyw_B, rows.places), axis=-1) / rows.steered_speeds
+    return np.concatenate([driven, steered], axis=1)
 
 
 def _refuse_skids(model: ContactForces) -> None:

@@ -3,10 +3,12 @@
 from rollerbench.kinematics.paths.curves import clothoid, spline
 from rollerbench.kinematics.paths.legs import Leg, arc, figure_eight, leg, line, square, through_waypoints
 from rollerbench.kinematics.paths.speed_laws import SpeedLaw, fastest_duration, twist_along
+from rollerbench.kinematics.paths.time_optimal import TimeOptimal, time_optimal
 
 __all__ = [
     "Leg",
     "SpeedLaw",
+    "TimeOptimal",
     "arc",
     "clothoid",
     "fastest_duration",
@@ -16,5 +18,6 @@ __all__ = [
     "spline",
     "square",
     "through_waypoints",
+    "time_optimal",
     "twist_along",
 ]
