@@ -2,19 +2,20 @@
 
 The base moves at the twist v = b s', with b per unit of the way s. Everything is an affine map of x = [s'', F] on a
 straight line without turning, and of x = [s'', s'^2, F] on a path whose b changes by db/ds = c: of the acceleration
-[m/s2] and the contact forces F [N] that the equations of the single wheels leave open. A wheel at angle k with the
+[m/s2] and the contact forces F [N] that the equations of the single wheels leave open. A wheel with the
 roller axis e1 at the angle g from its heading t, and e2 a quarter turn to the left of e1 (for a tyre e1 = t), feels the
 ground's force f1 e1 + f2 e2. With row(t) @ v the speed of its reference point along t:
 
-    hub       J_d q'' = T - R (f1 cos g - f2 sin g) - sgn(q') c N R,     R q'' = (row(t) + tan g row(n)) @ v'
-    roller    J_p v_r' = -r^2 (f2 + sgn(v_r) c N),                       v_r' = row(n) @ v' / cos g
+    hub       J_d q'' = T - R (f1 cos g - f2 sin g) - sgn(q') k N R,     R q'' = (row(t) + tan g row(n)) @ v'
+    roller    J_p v_r' = -r^2 (f2 + sgn(v_r) k N),                       v_r' = row(n) @ v' / cos g
     body      sum f = m a_com,     sum (p - com) x f = I_com w'
 
-where v' = b s'' + c s'^2 in B, and a_com = v'_xy + w x v_xy + w' x com - w^2 com. Here with the effort T, the load N, the coefficient c of rolling resistance, radii R and r, and the rotational inertias
-J_d of the wheel about its axle and J_p of the touching roller about its axis. The resisting moments act between hub and
-body, and roller and hub. f1 is open for driven wheels, f2 for tyres whose axle the body or a steering motor holds; a
-castor trails behind the way of its swivel axis and feels nothing sideways; a steered tyre is steered along its way. What
-it costs to swivel them is left out. A wheel that stands still resists neither way.
+where v' = b s'' + c s'^2 in B, and a_com = v'_xy + w x v_xy + w' x com - w^2 com. Here T is the effort, N the load, k
+the coefficient of rolling resistance, R and r are radii, and J_d and J_p the rotational inertias of the wheel about its
+axle and of the touching roller about its axis. The resisting moments act between hub and body, and roller and hub. f1
+is open for driven wheels, f2 for tyres whose axle the body or a steering motor holds; a castor trails behind the way
+of its swivel axis and feels nothing sideways; a steered tyre is steered along its way. What it costs to swivel them is
+left out. A wheel that stands still resists neither way.
 """
 
 from dataclasses import dataclass
@@ -68,7 +69,7 @@ class ContactForces:
         Args:
             robot: The robot.
             u: Unit vectors (d, 2) of travel; or with bend, twists b (d, 3) per unit of the way.
-            roll_resistance: Coefficient c [-].
+            roll_resistance: Coefficient k [-].
             loads: Loads (n_wheels,) to take as constant [N]; None for those of equilibrium.
             bend: How the twists b change along the way, c (d, 3); None for straight lines.
         """
@@ -260,7 +261,7 @@ class ContactForces:
         return fixed & (np.abs(self.side_speeds) > STILL)
 
     def _resistance(self, speed: Array) -> Affine:
-        """sgn(speed) c N (d, n_wheels)."""
+        """sgn(speed) k N (d, n_wheels)."""
         pull = self._c * np.sign(speed)
         return Affine(constant=pull * self.loads.constant, slope=pull[..., np.newaxis] * self.loads.slope)
 

@@ -27,7 +27,7 @@ from rollerbench.kinematics.limits.speed import speed_rows
 Array = NDArray[np.float64]
 Sharing = Literal["least_norm", "best"]
 
-LEVELS = 12
+LEVELS = 16
 """Steps from rest to the largest speed between which the set of (u, x) is taken as a polygon, from inside."""
 
 INSIDE = 1e-4

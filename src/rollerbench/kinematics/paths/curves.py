@@ -56,9 +56,9 @@ def clothoid(
 ) -> Leg:
     """Straight lines from the origin along points (k, 2) [m], each corner rounded by clothoid, arc and clothoid.
 
-    The curvature is continuous and linear in the way s: it rises from 0 to 1/R along a clothoid, on which the path turns
-    by d = s/(2R) in all, stays along the arc, and falls again. For a corner that turns by a, of which each clothoid takes
-    d, whose end lies at (X, Y) from its start, the rounding begins before the corner by
+    The curvature is continuous and linear in the way s: it rises from 0 to 1/R along a clothoid, on which the path
+    turns by d = s/(2R) in all, stays along the arc, and falls again. For a corner that turns by a, with the end of its
+    first clothoid at (X, Y) from its start, the rounding begins before the corner by
 
         X - R sin d + (Y + R cos d) tan(a/2)    and passes it at    (Y + R cos d) / cos(a/2) - R,
 

@@ -1,8 +1,8 @@
 """The fastest motion along a path under convex limits of acceleration and speed, by reachability.
 
 The way is cut into intervals of constant acceleration u = s'', over which the squared speed x = s'^2 grows by 2 u ds.
-Each interval holds the limits of both its ends, which leaves a convex set of pairs (x, y) of squared speeds at its start
-and end. A pass from the end finds the largest x from which the rest of the path can be followed; a pass from the
+Each interval holds the limits of both its ends, which leaves a convex set of pairs (x, y) of squared speeds at its
+start and end. A pass from the end finds the largest x from which the rest of the path can be followed; a pass from the
 start then always takes the largest y among these.
 
 Source: Pham and Pham (2018), A new approach to time-optimal path parameterization based on reachability analysis,
@@ -53,7 +53,7 @@ def intervals(steps: Array, levels: Array, low: Array, high: Array) -> Intervals
     lowest = np.maximum(at_start[1].min(axis=1), 0.0)
     highest = np.maximum(np.minimum(at_start[1].max(axis=1), at_end[1].max(axis=1)), lowest)
     y = np.sort(np.clip(y, lowest[:, np.newaxis], highest[:, np.newaxis]), axis=1)
-    bounds = [_crossed(*polygon, y) for polygon in (at_start, at_end)]
+    bounds = [_crossed(polygons, y) for polygons in (at_start, at_end)]
     (left, right), (other_left, other_right) = bounds
     return Intervals(y=y, left=np.maximum(left, other_left), right=np.minimum(right, other_right))
 
@@ -77,8 +77,9 @@ def fastest(pairs: Intervals) -> Array | None:
     return x
 
 
-def _crossed(x: Array, y: Array, at: Array) -> tuple[Array, Array]:
+def _crossed(polygons: tuple[Array, Array], at: Array) -> tuple[Array, Array]:
     """Where polygons with corners x, y (n, k) begin and end (n, m) at levels of y (n, m)."""
+    x, y = polygons
     dx, dy = np.roll(x, -1, axis=1) - x, np.roll(y, -1, axis=1) - y
     flat = dy == 0
     share = (at[..., np.newaxis] - y[:, np.newaxis]) / np.where(flat, 1.0, dy)[:, np.newaxis]

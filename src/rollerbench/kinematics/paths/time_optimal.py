@@ -22,7 +22,7 @@ from rollerbench.kinematics.rows import wheeled
 
 Array = NDArray[np.float64]
 
-INTERVALS: dict[Sharing, int] = {"least_norm": 480, "best": 120}
+INTERVALS: dict[Sharing, int] = {"least_norm": 480, "best": 160}
 """Intervals of constant acceleration on a leg; fewer where each needs many small optimisations."""
 
 JUMP = 1e-4
@@ -90,8 +90,8 @@ def time_optimal(
 ) -> TimeOptimal:
     """The fastest motion along legs, from rest to rest on each, within the limits of the robot's wheels.
 
-    Its driven wheels keep their max_speed and max_effort, steered ones their max_steering_speed, and no wheel needs more
-    than its friction times its load, which the acceleration shifts (`limits.path_limits` and `reachability` say how).
+    Its driven wheels keep their max_speed and max_effort, steered ones their max_steering_speed, and no wheel needs
+    more than its friction times its load, which the acceleration shifts (see `path_limits` and `reachability`).
     Steered tyres and castors follow their way at once: what it takes to swivel them is left out.
 
     Args:
@@ -130,7 +130,7 @@ def time_optimal(
     ends = np.cumsum([run.twist.breaks[-1] for run in runs]) + pause / max(1, len(legs) - 1) * np.arange(len(legs))
     starts = [end - run.twist.breaks[-1] for end, run in zip(ends, runs, strict=True)]
     return TimeOptimal(
-        twist=_in_turn([run.twist for run in runs], starts),
+        twist=_in_turn([run.twist for run in runs], starts, rests=pause > 0),
         time=np.concatenate([start + run.time for start, run in zip(starts, runs, strict=True)]),
         usage={kind: np.concatenate([run.usage[kind] for run in runs]) for kind in runs[0].usage},
     )
@@ -193,12 +193,14 @@ def _slowed(twist: Profile, robot: Robot, margin: float) -> Profile:
     return Profile(breaks=twist.breaks * excess, values=twist.values / excess, slopes=twist.slopes / excess**2)
 
 
-def _in_turn(twists: Sequence[Profile], starts: Sequence[float]) -> Profile:
+def _in_turn(twists: Sequence[Profile], starts: Sequence[float], *, rests: bool) -> Profile:
     """Twists from rest to rest, one after the other, each from its start on."""
-    breaks, values, slopes = [], [], []
+    breaks: list[Array] = []
+    values: list[Array] = []
+    slopes: list[Array] = []
     for twist, start in zip(twists, starts, strict=True):
         time = start + twist.breaks
-        if breaks and start > breaks[-1][-1]:
+        if breaks and rests:
             # At rest until then: its acceleration begins at once.
             breaks.append(time[:1] - JUMP * (time[1] - time[0]))
             values.append(np.zeros((1, 3)))
