@@ -18,7 +18,8 @@ CLOTHOID_SHARE = 0.5
 SHARPEST_TURN = math.radians(170.0)
 """Largest turn of a corner that is rounded [rad]: beyond, the rounding would begin far from it."""
 
-NODES_PER_CORNER = 160
+NODES_PER_CORNER = 960
+"""Samples per corner: where clothoids begin and end the change of the curvature jumps, which splines smear."""
 
 _GAUSS_NODES, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(8)
 
@@ -91,7 +92,7 @@ def clothoid(
     start = heading[0]
 
     turning = _free_yaw(corners, yaw, tangent)
-    count = max(NODES, NODES_PER_CORNER * len(turns) + 1)
+    count = NODES + NODES_PER_CORNER * len(turns)
 
     def pose(u: Array) -> tuple[ArrayLike, ArrayLike, ArrayLike]:
         s = u * knots[-1]

@@ -28,7 +28,7 @@ INTERVALS: dict[Sharing, int] = {"least_norm": 480, "best": 160}
 JUMP = 1e-4
 """Share of an interval in which the acceleration changes to that of the next [-]."""
 
-SAMPLES = 8
+SAMPLES = 16
 """Samples of the twist on an interval that must keep the limits of speed."""
 
 
@@ -140,16 +140,16 @@ def _run(robot: Robot, each: Leg, options: _Options) -> TimeOptimal:
     """The fastest motion along one leg."""
     # The ends of the intervals, and what they use in their middle.
     course = _course(each, robot, 2 * INTERVALS[options.sharing])
-    s, b, c = course.s[::2], course.b[::2], course.c[::2]
     at_ends, inside = (_limits(robot, course.b[i::2], course.c[i::2], options) for i in (0, 1))
-    levels, low, high = at_ends.ranges(_reachable(robot, b, course.s[-1], options.ground_friction))
-    x = fastest(intervals(np.diff(s), levels, low, high))
-    if x is None or (x[1:-1] <= 0).any():
+    steps = np.diff(course.s[::2])
+    levels, low, high = at_ends.ranges(_reachable(robot, course, options.ground_friction)[::2])
+    ends = fastest(intervals(steps, levels, low, high))
+    if ends is None or (ends[1:-1] <= 0).any():
         raise KinematicsError(f"{robot.name} cannot follow the path, however slowly")
-    u, middle = 0.5 * np.diff(x) / np.diff(s), 0.5 * (x[1:] + x[:-1])
-    twist = _slowed(_twist(s, x, u, b, c), robot, options.margin)
-    time = twist.breaks[:-1:2] + np.diff(s) / (np.sqrt(x[:-1]) + np.sqrt(middle))
-    return TimeOptimal(twist=twist, time=time, usage=inside.usage(u, middle))
+    u, x = 0.5 * np.diff(ends) / steps, np.zeros(len(course.s))
+    x[::2], x[1::2] = ends, 0.5 * (ends[1:] + ends[:-1])
+    twist = _slowed(_twist(course, x, np.repeat(u, 2)), robot, options.margin)
+    return TimeOptimal(twist=twist, time=twist.breaks[2:-1:4], usage=inside.usage(u, x[1::2]))
 
 
 def _limits(robot: Robot, b: Array, c: Array, options: _Options) -> PathLimits:
@@ -165,10 +165,10 @@ def _limits(robot: Robot, b: Array, c: Array, options: _Options) -> PathLimits:
     )
 
 
-def _twist(s: Array, x: Array, u: Array, b: Array, c: Array) -> Profile:
-    """The twist over time from 0 on, two breaks an interval: at its start, and just before its end."""
-    pace = np.sqrt(x)[:, np.newaxis]
-    steps = 2 * np.diff(s) / (pace[1:, 0] + pace[:-1, 0])
+def _twist(course: _Course, x: Array, u: Array) -> Profile:
+    """The twist over time from 0 on, two breaks for each step of the way: at its start, and just before its end."""
+    b, c, pace = course.b, course.c, np.sqrt(x)[:, np.newaxis]
+    steps = 2 * np.diff(course.s) / (pace[1:, 0] + pace[:-1, 0])
     time = np.concatenate([[0.0], np.cumsum(steps)])
     values, push = b * pace, u[:, np.newaxis]
     after, before = b[:-1] * push + c[:-1] * x[:-1, np.newaxis], b[1:] * push + c[1:] * x[1:, np.newaxis]
@@ -219,7 +219,81 @@ def _course(each: Leg, robot: Robot, count: int) -> _Course:
     scale = np.array([1.0, 1.0, float(np.sqrt(np.mean(np.sum(arms**2, axis=1)))) or 1.0])
     path = CubicSpline(np.linspace(0, 1, len(each.q_xyt)), each.q_xyt)
     nodes, weights = np.polynomial.legendre.leggauss(5)
-    u = np.linspace(0, 1, 4 * len(each.q_xyt) + 1)
+    u = np.linspace(0, 1, 2 * len(each.q_xyt) + 1)
+    inner = u[:-1, np.newaxis] + 0.5 * np.diff(u)[:, np.newaxis] * (1 + nodes)
+    pace = np.linalg.norm(path(inner, 1) * scale, axis=-1)
+    way = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(u) * (pace @ weights))])
+    pace = np.linalg.norm(path(u, 1) * scale, axis=-1)
+    if not way[-1] > 0 or pace.min() < 1e-6 * way[-1]:
+        raise KinematicsError("a leg stands still on its way: accepted: legs whose parameter always moves the robot")
+    s = np.linspace(0, way[-1], count + 1)
+    u = CubicHermiteSpline(way, u, 1 / pace)(s)
+    yaw, slope = path(u)[:, 2], path(u, 1)
+    slope /= np.linalg.norm(slope * scale, axis=-1)[:, np.newaxis]
+    along = rotate(-yaw, slope[:, :2])
+    if each.tangent:
+        # Exactly, not but for the spline's error: tyres allow nothing else.
+        along = np.column_stack([np.hypot(along[:, 0], along[:, 1]), np.zeros(len(s))])
+    twist = np.column_stack([along, slope[:, 2]])
+    # Differences, for where the curvature has a kink the spline's second derivative swings.
+    return _Course(s=s, b=twist, c=np.gradient(twist, s, axis=0, edge_order=2))
+
+
+def _twist(course: _Course, x: Array, u: Array) -> Profile:
+    """The twist over time from 0 on, two breaks for each step of the way: at its start, and just before its end."""
+    b, c, pace = course.b, course.c, np.sqrt(x)[:, np.newaxis]
+    steps = 2 * np.diff(course.s) / (pace[1:, 0] + pace[:-1, 0])
+    time = np.concatenate([[0.0], np.cumsum(steps)])
+    values, push = b * pace, u[:, np.newaxis]
+    after, before = b[:-1] * push + c[:-1] * x[:-1, np.newaxis], b[1:] * push + c[1:] * x[1:, np.newaxis]
+    gap = JUMP * steps
+    return Profile(
+        breaks=np.append(np.column_stack([time[:-1], time[1:] - gap]).ravel(), time[-1]),
+        values=np.vstack([_woven(values[:-1], values[1:] - gap[:, np.newaxis] * before), np.zeros(3)]),
+        slopes=np.vstack([_woven(after, before), np.zeros(3)]),
+    )
+
+
+def _woven(one: Array, other: Array) -> Array:
+    """Rows (2n, 3) of two arrays (n, 3), in turn."""
+    return np.stack([one, other], axis=1).reshape(-1, one.shape[1])
+
+
+def _slowed(twist: Profile, robot: Robot, margin: float) -> Profile:
+    """The twist, slower by the little that its speeds between the breaks exceed the limits."""
+    pieces = len(twist.breaks) - 1
+    time = np.interp(np.arange(SAMPLES * pieces + 1) / SAMPLES, np.arange(pieces + 1), twist.breaks)
+    excess = max(1.0, float(speed_usage(robot, twist(time)).max(initial=0.0)) / margin)
+    return Profile(breaks=twist.breaks * excess, values=twist.values / excess, slopes=twist.slopes / excess**2)
+
+
+def _in_turn(twists: Sequence[Profile], starts: Sequence[float], *, rests: bool) -> Profile:
+    """Twists from rest to rest, one after the other, each from its start on."""
+    breaks: list[Array] = []
+    values: list[Array] = []
+    slopes: list[Array] = []
+    for twist, start in zip(twists, starts, strict=True):
+        time = start + twist.breaks
+        if breaks and rests:
+            # At rest until then: its acceleration begins at once.
+            breaks.append(time[:1] - JUMP * (time[1] - time[0]))
+            values.append(np.zeros((1, 3)))
+            slopes.append(np.zeros((1, 3)))
+        elif breaks:
+            breaks[-1], values[-1], slopes[-1] = breaks[-1][:-1], values[-1][:-1], slopes[-1][:-1]
+        breaks.append(time)
+        values.append(twist.values)
+        slopes.append(twist.slopes)
+    return Profile(breaks=np.concatenate(breaks), values=np.vstack(values), slopes=np.vstack(slopes))
+
+
+def _course(each: Leg, robot: Robot, count: int) -> _Course:
+    """A leg at count + 1 equal steps of its way."""
+    arms = np.array([wheel.p_BoHo_B[:2] for wheel in robot.wheels])
+    scale = np.array([1.0, 1.0, float(np.sqrt(np.mean(np.sum(arms**2, axis=1)))) or 1.0])
+    path = CubicSpline(np.linspace(0, 1, len(each.q_xyt)), each.q_xyt)
+    nodes, weights = np.polynomial.legendre.leggauss(5)
+    u = np.linspace(0, 1, 2 * len(each.q_xyt) + 1)
     inner = u[:-1, np.newaxis] + 0.5 * np.diff(u)[:, np.newaxis] * (1 + nodes)
     pace = np.linalg.norm(path(inner, 1) * scale, axis=-1)
     way = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(u) * (pace @ weights))])
@@ -244,13 +318,14 @@ def _course(each: Leg, robot: Robot, count: int) -> _Course:
     return _Course(s=s, b=np.column_stack([along, slope[:, 2]]), c=np.column_stack([curving, bend[:, 2]]))
 
 
-def _reachable(robot: Robot, b: Array, way: float, ground_friction: float | None) -> Array:
+def _reachable(robot: Robot, course: _Course, ground_friction: float | None) -> Array:
     """Squared speeds (d,) that no push of the ground exceeds: mu m g over the way of the fastest wheel, as energy."""
     inertia, friction = robot.inertia, float(friction_coefficients(robot, ground_friction).max())
     places = np.array([wheel.p_BoHo_B[:2] for wheel in robot.wheels])
     turn = np.column_stack([-places[:, 1], places[:, 0]])
+    b = course.b
     pace = np.linalg.norm(b[:, np.newaxis, :2] + b[:, np.newaxis, 2:] * turn, axis=-1).max(axis=1)
-    way *= float(np.max(pace))
+    way = float(np.max(pace)) * course.s[-1]
     at_com = b[:, :2] + b[:, 2:] * np.array([-inertia.com[1], inertia.com[0]])
     mass = robot.mass * np.sum(at_com**2, axis=1) + inertia.moment[2, 2] * b[:, 2] ** 2
     return 2 * friction * robot.mass * GRAVITY * way / mass
