@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Ranges = tuple[Array, Array, Array]
 
 ROUNDING = 1e-12
 
@@ -34,21 +35,18 @@ class Intervals:
     right: Array
 
 
-def intervals(steps: Array, levels: Array, low: Array, high: Array) -> Intervals:
+def intervals(steps: Array, starts: Ranges, ends: Ranges) -> Intervals:
     """The pairs (x, y) of all intervals.
 
     Args:
         steps: Ways ds (n,).
-        levels: Squared speeds (n + 1, k) at the ends, from 0 up.
-        low: Smallest u (n + 1, k) at these levels, convex over them.
-        high: Largest u (n + 1, k), concave.
+        starts: What the limits at the starts of the intervals allow: squared speeds (n, k) from 0 up, the smallest u
+            (n, k) at these, convex over them, and the largest, concave.
+        ends: As much at their ends.
     """
     gain = 2.0 * steps[:, np.newaxis]
-    # Continued below rest, so that the ranges of x at small y do not end in a corner.
-    levels, low, high = (np.column_stack([2 * rows[:, 0] - rows[:, 1], rows]) for rows in (levels, low, high))
-    x, y = (np.concatenate([rows, rows[:, ::-1]], axis=1) for rows in (levels[:-1], levels[1:]))
-    at_start = x, x + gain * np.concatenate([low[:-1], high[:-1, ::-1]], axis=1)
-    at_end = y - gain * np.concatenate([low[1:], high[1:, ::-1]], axis=1), y
+    (x, by_start), (y, by_end) = _outline(starts), _outline(ends)
+    at_start, at_end = (x, x + gain * by_start), (y - gain * by_end, y)
     y = np.concatenate([at_start[1], at_end[1]], axis=1)
     lowest = np.maximum(at_start[1].min(axis=1), 0.0)
     highest = np.maximum(np.minimum(at_start[1].max(axis=1), at_end[1].max(axis=1)), lowest)
@@ -75,6 +73,15 @@ def fastest(pairs: Intervals) -> Array | None:
             return None
         x[i + 1] = reached
     return x
+
+
+def _outline(ranges: Ranges) -> tuple[Array, Array]:
+    """Corners (n, 2k + 2) of the polygons of squared speeds and u.
+
+    They are continued below rest, so that the ranges of x at small y do not end in a corner.
+    """
+    levels, low, high = (np.column_stack([2 * rows[:, 0] - rows[:, 1], rows]) for rows in ranges)
+    return np.concatenate([levels, levels[:, ::-1]], axis=1), np.concatenate([low, high[:, ::-1]], axis=1)
 
 
 def _crossed(polygons: tuple[Array, Array], at: Array) -> tuple[Array, Array]:

@@ -138,16 +138,20 @@ def time_optimal(
 
 def _run(robot: Robot, each: Leg, options: _Options) -> TimeOptimal:
     """The fastest motion along one leg."""
-    # The ends of the intervals, and what they use in their middle.
     course = _course(each, robot, 2 * INTERVALS[options.sharing])
-    at_ends, inside = (_limits(robot, course.b[i::2], course.c[i::2], options) for i in (0, 1))
-    steps = np.diff(course.s[::2])
-    levels, low, high = at_ends.ranges(_reachable(robot, course, options.ground_friction)[::2])
-    ends = fastest(intervals(steps, levels, low, high))
-    if ends is None or (ends[1:-1] <= 0).any():
+    steps, cap = np.diff(course.s[::2]), _reachable(robot, course, options.ground_friction)[::2]
+    # Starts, middles and ends of the intervals; each takes how the twist changes from its own interval alone.
+    first, middle, last = course.b[:-2:2], course.b[1::2], course.b[2::2]
+    changes = -3 * first + 4 * middle - last, last - first, first - 4 * middle + 3 * last
+    c = [change / steps[:, np.newaxis] for change in changes]
+    both = _limits(robot, np.vstack([first, last]), np.vstack([c[0], c[2]]), options)
+    starts, ends = zip(*(np.split(rows, 2) for rows in both.ranges(np.concatenate([cap[:-1], cap[1:]]))), strict=True)
+    inside = _limits(robot, middle, c[1], options)
+    squares = fastest(intervals(steps, starts, ends))
+    if squares is None or (squares[1:-1] <= 0).any():
         raise KinematicsError(f"{robot.name} cannot follow the path, however slowly")
-    u, x = 0.5 * np.diff(ends) / steps, np.zeros(len(course.s))
-    x[::2], x[1::2] = ends, 0.5 * (ends[1:] + ends[:-1])
+    u, x = 0.5 * np.diff(squares) / steps, np.zeros(len(course.s))
+    x[::2], x[1::2] = squares, 0.5 * (squares[1:] + squares[:-1])
     twist = _slowed(_twist(course, x, np.repeat(u, 2)), robot, options.margin)
     return TimeOptimal(twist=twist, time=twist.breaks[2:-1:4], usage=inside.usage(u, x[1::2]))
 
@@ -235,7 +239,7 @@ def _course(each: Leg, robot: Robot, count: int) -> _Course:
         # Exactly, not but for the spline's error: tyres allow nothing else.
         along = np.column_stack([np.hypot(along[:, 0], along[:, 1]), np.zeros(len(s))])
     twist = np.column_stack([along, slope[:, 2]])
-    # Differences, for where the curvature has a kink the spline's second derivative swings.
+    # Differences: where the curvature has a kink, the spline's second derivative swings.
     return _Course(s=s, b=twist, c=np.gradient(twist, s, axis=0, edge_order=2))
 
 
