@@ -31,12 +31,12 @@ def twist_along(legs: Sequence[Leg], duration: float, law: SpeedLaw, radius: flo
     efforts = np.array([each.effort(radius) for each in legs])
     moving = efforts * (duration - pause) / efforts.sum()
     starts = np.concatenate([[0.0], np.cumsum(moving[:-1] + pause / max(1, len(legs) - 1))])
-    tau = np.linspace(0, 1, NODES)
-    u, rate = _speed_law(law, tau)
     breaks: list[Array] = []
     values: list[Array] = []
     slopes: list[Array] = []
     for each, start, end in zip(legs, starts, starts + moving, strict=True):
+        tau = np.linspace(0, 1, max(NODES, len(each.q_xyt)))
+        u, rate = _speed_law(law, tau)
         path = CubicSpline(np.linspace(0, 1, len(each.q_xyt)), each.q_xyt)
         pose, derivative = path(u), path(u, 1) * (rate / (end - start))[:, np.newaxis]
         twist = np.column_stack([rotate(-pose[:, 2], derivative[:, :2]), derivative[:, 2]])
