@@ -32,6 +32,7 @@ from .kinematics import gaits as gaits
 from .kinematics import legs as legs
 from .kinematics import limits as limits
 from .kinematics import odometry as odometry
+from .kinematics import paths as paths
 from .kinematics import uncertainty as uncertainty
 from .plant import RobotModel as RobotModel
 from .plant import add_ground as add_ground

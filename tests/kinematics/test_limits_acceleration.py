@@ -261,15 +261,15 @@ def test_a_wheel_that_hangs_carries_nothing() -> None:
 @pytest.mark.parametrize("adhesion", ["circle", "independent"])
 def test_the_optimum_equals_a_linear_program(name: str, adhesion: str) -> None:
     """Circles by 512 tangents: the linear program's optimum is larger, by 1 - cos(pi/512) of the forces at the most."""
-    from rollerbench.kinematics.limits.acceleration import _cones
     from rollerbench.kinematics.limits.contact_forces import ContactForces
+    from rollerbench.kinematics.limits.force_limits import limit_cones
 
     robot = weakened(robots.ALL[name]())
     directions = np.array([0.0]) if name in ("cart", "mixed") else np.linspace(0.1, 3.0, 5)
     limit = rb.limits.max_acceleration(robot, directions, roll_resistance=0.05, adhesion=adhesion)
     friction = np.array([wheel.friction for wheel in robot.wheels])
     model = ContactForces(robot, np.column_stack([np.cos(directions), np.sin(directions)]), 0.05, None)
-    cones, _, _ = _cones(model, friction, adhesion)
+    cones, _, _ = limit_cones(model, friction, adhesion)
     angle = np.linspace(0, 2 * np.pi, 512, endpoint=False)
     tangents = np.column_stack([-np.ones(512), np.cos(angle), np.sin(angle)])
     for i, value in enumerate(limit.value):

@@ -2,11 +2,17 @@
 
 import itertools
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.special import fresnel
 
+from rollerbench.errors import KinematicsError
 from rollerbench.kinematics import paths
+from rollerbench.kinematics.odometry import rotate
 from rollerbench.kinematics.profile import reference_poses, sum_of_steps
 
 LAWS = ("minimum_jerk", "trapezoidal")
@@ -40,6 +46,7 @@ CASES = {
     "square": lambda tangent: paths.square(0.8, tangent=tangent),
     "figure_eight": lambda tangent: [paths.figure_eight(2.0, tangent=tangent)],
     "spline": lambda tangent: [paths.spline([[1.0, 0.0], [1.0, 1.0], [0.0, 1.5]], tangent=tangent)],
+    "clothoid": lambda tangent: [paths.clothoid([[1.0, 0.0], [1.5, 1.0], [0.0, 1.5]], tangent=tangent)],
     "waypoints": lambda tangent: paths.through_waypoints([[1, 0], [1, 1, 1.0], [0, 0]], tangent=tangent),
 }
 
@@ -89,3 +96,84 @@ def test_waypoints_turn_the_shorter_way() -> None:
     legs = paths.through_waypoints([[-1.0, -0.1], [-2.0, -0.1, math.pi]], tangent=True)
     assert legs[0].turn == pytest.approx(math.pi - math.atan2(0.1, 1.0))
     assert all(leg.turn <= math.pi + 1e-9 for leg in legs)
+
+
+turns = st.lists(st.floats(-2.9, 2.9), min_size=1, max_size=4)
+sides = st.lists(st.floats(0.2, 3.0), min_size=5, max_size=5)
+
+
+@given(turns, sides, st.floats(0.01, 1.0), st.floats(-3.0, 3.0))
+@settings(max_examples=20, deadline=None)
+def test_a_clothoid_path_rounds_its_corners_evenly(
+    corners: list[float], lengths: list[float], deviation: float, start: float
+) -> None:
+    """Continuous curvature, linear in the way but for four kinks a corner; from the first line to the last point."""
+    heading = start + np.concatenate([[0.0], np.cumsum(corners)])
+    steps = np.array(lengths[: len(heading)])[:, np.newaxis] * np.column_stack([np.cos(heading), np.sin(heading)])
+    points = np.cumsum(steps, axis=0)
+    leg = paths.clothoid(points, deviation=deviation, tangent=True)
+    x, y, yaw = leg.q_xyt.T
+    assert leg.q_xyt[0] == pytest.approx(np.zeros(3), abs=1e-12)
+    assert rotate(start, leg.q_xyt[-1, :2]) == pytest.approx(points[-1], abs=1e-9)
+    assert yaw[-1] == pytest.approx(np.sum(corners), abs=1e-9)
+    # Nodes are evenly spaced, and the path leads where the yaw points to.
+    chords = np.hypot(np.diff(x), np.diff(y))
+    step = chords.max()
+    assert chords == pytest.approx(np.full(len(chords), step), rel=0.02)
+    curvature = np.diff(yaw) / step
+    kinks = np.abs(np.diff(curvature, 2)) > 1e-7 * max(1.0, np.abs(curvature).max())
+    assert np.sum(np.diff(kinks.astype(int)) == 1) <= 4 * len(corners) + 1
+    for corner in points[:-1]:
+        nearest = np.hypot(*(leg.q_xyt[:, :2] - rotate(-start, corner)).T).min()
+        assert nearest <= deviation + step
+    straight = paths.clothoid(points, deviation=deviation)
+    assert rotate(-start, straight.q_xyt[:, :2]) == pytest.approx(leg.q_xyt[:, :2], abs=1e-9)
+    assert not straight.q_xyt[:, 2].any()
+
+
+def test_a_clothoid_is_that_of_fresnel() -> None:
+    """From its start a rounding lies on x = a sqrt(pi) C(s / (a sqrt(pi))), y likewise by S, with a^2 = R length."""
+    leg = paths.clothoid([[1.0, 0.0], [1.0, 1.0]], tangent=True)
+    s = np.linspace(0, leg.length, len(leg.q_xyt))
+    # The room is used up: the rounding begins at the start. Its clothoids take a quarter of 90 deg each.
+    quarter = math.radians(22.5)
+    end = int(np.argmin(np.abs(leg.q_xyt[:, 2] - quarter)))
+    scale = s[end] * math.sqrt(math.pi / (2 * leg.q_xyt[end, 2]))
+    sine, cosine = fresnel(s[:end] / scale)
+    assert leg.q_xyt[:end, 0] == pytest.approx(scale * cosine, abs=1e-6)
+    assert leg.q_xyt[:end, 1] == pytest.approx(scale * sine, abs=1e-6)
+    # Its middle lies on the bisector, as far from the corner as a smaller deviation would have it.
+    middle = leg.q_xyt[len(s) // 2]
+    assert middle[:2] == pytest.approx([middle[0], 1 - middle[0]], abs=1e-9)
+    passed = math.hypot(1 - middle[0], middle[1])
+    smaller = paths.clothoid([[1.0, 0.0], [1.0, 1.0]], deviation=0.5 * passed, tangent=True).q_xyt
+    assert np.hypot(*(smaller[:, :2] - [1, 0]).T).min() == pytest.approx(0.5 * passed, abs=1e-6)
+
+
+@pytest.mark.parametrize("curve", [paths.spline, paths.clothoid])
+def test_a_free_yaw_passes_the_yaws_of_the_points(curve: Callable[..., paths.Leg]) -> None:
+    points = [[1.0, 0.0], [1.0, 1.0], [0.0, 1.5], [-1.0, 1.5]]
+    leg = curve(points, yaw=[1.0, math.nan, -7.0, math.nan])
+    fixed = curve(points)
+    assert leg.q_xyt[:, :2] == pytest.approx(fixed.q_xyt[:, :2], abs=1e-12)
+    for point, yaw in ((0, 1.0), (2, -7.0), (3, -7.0)):
+        nearest = np.argmin(np.hypot(*(leg.q_xyt[:, :2] - points[point]).T))
+        # Where a corner is rounded, its middle is close to the nearest point.
+        assert leg.q_xyt[nearest, 2] == pytest.approx(yaw, abs=0.06)
+    rate = np.diff(leg.q_xyt[:, 2])
+    assert np.abs(np.diff(rate)).max() < 0.05 * np.abs(rate).max()
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: paths.clothoid([[1, 0], [0, 0.01]]), "point 1, .*turns by 179.4 deg"),
+        (lambda: paths.clothoid([[1, 0], [1, 0]]), "two in a row"),
+        (lambda: paths.spline([[1, 0]], yaw=[1, 2]), "yaw = "),
+        (lambda: paths.spline([[1, 0]], tangent=True, yaw=[1]), "without tangent heading"),
+        (lambda: paths.spline([1, 0]), "points = "),
+    ],
+)
+def test_what_is_no_path_is_said(make: Callable[[], paths.Leg], words: str) -> None:
+    with pytest.raises(KinematicsError, match=words):
+        make()

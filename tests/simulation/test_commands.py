@@ -32,6 +32,16 @@ CART = {**BASE, "robot": "differential_cart"}
         ({"type": "path", "name": "line", "length": 4.0, "speed": 0.1}, ["command.speed = 0.1", "takes 53"]),
         ({"type": "waypoints", "waypoints": [[1]]}, ["waypoints[0] = [1]", "at least 2"]),
         ({"type": "waypoints", "waypoints": [[0, 0]]}, ["no length"]),
+        ({"type": "waypoints", "waypoints": [[9, 0]], "speed_law": "time_optimal"}, ["duration = 4", "takes 6.6"]),
+        ({"type": "path", "name": "line", "length": 1, "margin": 0.5}, ["margin: not with speed_law: trapezoidal"]),
+        (
+            {"type": "path", "name": "line", "length": 1, "speed": 1, "speed_law": "time_optimal"},
+            ["speed: not with", "margin"],
+        ),
+        ({"type": "path", "name": "circle", "radius": 1, "heading": "free"}, ["heading = 'free'", "no points"]),
+        ({"type": "path", "name": "spline", "points": [[1, 0, 90]]}, ["yaw_deg belongs to heading: free"]),
+        ({"type": "path", "name": "spline", "points": [[1, 0]], "deviation": 0.1}, ["deviation: a spline has none"]),
+        ({"type": "path", "name": "clothoid", "points": [[1, 0], [0, 0]]}, ["command: point 1", "turns by 180 deg"]),
     ],
 )
 def test_a_fault_is_named(command: dict[str, Any], words: list[str]) -> None:
@@ -39,6 +49,43 @@ def test_a_fault_is_named(command: dict[str, Any], words: list[str]) -> None:
         rb.load_scenario({**BASE, "command": command})
     for word in words:
         assert word in str(caught.value)
+
+
+def test_time_optimal_runs_go_at_once_and_then_rest() -> None:
+    path = {"type": "path", "name": "clothoid", "points": [[1, 0], [1, 1, 90]], "heading": "free"}
+    scenario = rb.load_scenario({**BASE, "command": {**path, "speed_law": "time_optimal", "margin": 0.8}})
+    legs = [rb.paths.clothoid([[1, 0], [1, 1]], yaw=[math.nan, math.pi / 2])]
+    fastest = rb.paths.time_optimal("youbot_base", legs, margin=0.8)
+    twist = scenario.motion.twist
+    assert twist.breaks[-1] == fastest.duration < 4.0
+    assert twist(4.0) == pytest.approx(np.zeros(3))
+    assert scenario.motion.wheel_speeds.peak.max() == pytest.approx(0.8 * 30.0, rel=1e-3)
+
+
+@pytest.mark.parametrize(("limit", "value"), [("effort", {"max_effort": 1.5}), ("adhesion", {"friction": 0.3})])
+def test_a_cart_in_drake_uses_its_limits_as_planned(limit: str, value: dict[str, float]) -> None:
+    """Wheel speeds exactly; efforts within 1 % for 98 % of the time: the step of the acceleration rings shortly."""
+    cart = rb.load_robot("differential_cart").model_dump(mode="json", exclude_none=True)
+    cart["wheels"] = [{**wheel, **({} if wheel["type"] == "castor" else value)} for wheel in cart["wheels"]]
+    path = {"type": "path", "name": "clothoid", "points": [[1.5, 0], [1.5, 1.5]], "speed_law": "time_optimal"}
+    scenario = rb.load_scenario(
+        {
+            **{**BASE, "robot": rb.load_robot(cart), "duration": 3.6, "plant": {"time_step": 0.002}},
+            **{"ground": {"friction": value.get("friction", 0.8)}, "command": {**path, "margin": 0.9}},
+        }
+    )
+    fastest = scenario.command.fastest(scenario.robot)
+    assert fastest.usage[limit].max() == pytest.approx(0.9, rel=1e-3)
+    recording = rb.run(scenario, save=False).recording
+    assert (np.abs(recording.wheels("measured")[:, :2]) <= 0.9 * 15.0 * 1.002).all()
+    efforts = np.abs(recording.wheels("effort")[:, :2]).max(axis=1)
+    moving = (recording.time > 0.02) & (recording.time < fastest.duration - 0.02)
+    planned = np.interp(recording.time, fastest.time, fastest.usage["effort"]) * cart["wheels"][0]["max_effort"]
+    off = (efforts - planned)[moving] / planned.max()
+    assert np.mean(off < 0.01) > 0.98
+    # Without slip: friction has what it needs.
+    slip = np.hypot(recording.wheels("slip_x"), recording.wheels("slip_y"))[:, :2]
+    assert np.percentile(slip[moving], 98) < 0.01
 
 
 def test_pieces_follow_each_other() -> None:

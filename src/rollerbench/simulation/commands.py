@@ -10,14 +10,9 @@ from pydantic import Field, model_validator
 from rollerbench.description import Robot
 from rollerbench.description.part import NonNegative, Number, Part, Positive, Vector3
 from rollerbench.description.problems import Problem
-from rollerbench.kinematics import WheelKinematics, paths
 from rollerbench.kinematics.profile import Profile, held_with_ramps, sum_of_steps
 from rollerbench.simulation.leg_command import GaitCommand
-
-STEERING_PAUSE = 0.5
-"""Rest between the legs of a path in which steered wheels turn to the next [s]."""
-
-Infeasible = Literal["refuse", "project"]
+from rollerbench.simulation.path_commands import Infeasible, PathCommand, WaypointsCommand
 
 
 class TwistPiece(Part):
@@ -181,146 +176,6 @@ class WheelEffortsCommand(Part):
         )
 
 
-class _AlongPath(Part):
-    """What commands that follow a path share.
-
-    Attributes:
-        heading: "tangent": the body looks along the path; "fixed": it keeps its heading, or turns evenly on the way. By
-            default tangent for robots that cannot move in every direction (degree of manoeuvrability below 3).
-        speed: Largest speed of Bo, and of a point at the wheels' mean distance as the body turns [m/s]. By default as
-            slow as the scenario's duration allows.
-        speed_law: "minimum_jerk", or "trapezoidal" with smooth corners.
-        infeasible: "refuse" a twist at which a tyre would skid, or "project" it on what is feasible.
-    """
-
-    heading: Literal["tangent", "fixed"] | None = None
-    speed: Positive | None = None
-    speed_law: paths.SpeedLaw = "trapezoidal"
-    infeasible: Infeasible = "refuse"
-
-    def legs(self, robot: Robot) -> list[paths.Leg]:
-        """The path from rest to rest."""
-        raise AssertionError("each command has its own")
-
-    def problems(self, robot: Robot, duration: float, time_step: float) -> Iterator[Problem]:
-        """A speed too low for the duration."""
-        legs = self.legs(robot)
-        if sum(each.effort(1.0) for each in legs) < 1e-9:
-            yield Problem(("command",), "the path has no length; accepted: one that leads somewhere")
-        elif self._pause(robot, legs) >= duration:
-            message = (
-                f"the rests in which its wheels steer take {self._pause(robot, legs):g} s; accepted: a longer duration"
-            )
-            yield Problem(("command",), message)
-        elif self.speed is not None:
-            needed = paths.fastest_duration(legs, self.speed, self.speed_law, _turning_radius(robot))
-            needed += self._pause(robot, legs)
-            if needed > duration:
-                message = f"the path takes {needed:.4g} s at this speed; accepted: a duration or speed that is larger"
-                yield Problem(("command", "speed"), message, self.speed)
-
-    def twist(self, robot: Robot, duration: float, time_step: float) -> Profile:
-        """Body twist (3) over time."""
-        legs, radius = self.legs(robot), _turning_radius(robot)
-        if self.speed is not None:
-            duration = paths.fastest_duration(legs, self.speed, self.speed_law, radius) + self._pause(robot, legs)
-        return paths.twist_along(legs, duration, self.speed_law, radius, pause=self._pause(robot, legs))
-
-    def _pause(self, robot: Robot, legs: list[paths.Leg]) -> float:
-        """Time of all rests between legs, in which steered wheels turn [s]."""
-        return STEERING_PAUSE * (len(legs) - 1) if robot.steered_wheels else 0.0
-
-    def _tangent(self, robot: Robot) -> bool:
-        if self.heading is not None:
-            return self.heading == "tangent"
-        return WheelKinematics(robot).mobility().degree_of_manoeuvrability < 3
-
-
-class WaypointsCommand(_AlongPath):
-    """Straight lines from waypoint to waypoint, with a rest at each.
-
-    Attributes:
-        waypoints: Each [x, y] or [x, y, yaw_deg], in the frame of the start [m, m, deg].
-    """
-
-    type: Literal["waypoints"] = "waypoints"
-    waypoints: Annotated[
-        tuple[Annotated[tuple[Number, ...], Field(min_length=2, max_length=3)], ...], Field(min_length=1)
-    ]
-
-    def legs(self, robot: Robot) -> list[paths.Leg]:
-        """The lines, and turns on the spot."""
-        waypoints = [(*waypoint[:2], *map(math.radians, waypoint[2:])) for waypoint in self.waypoints]
-        return paths.through_waypoints(waypoints, tangent=self._tangent(robot))
-
-
-class PathCommand(_AlongPath):
-    """A named path from the start.
-
-    Attributes:
-        name: line (length, direction_deg), arc (radius, angle_deg), circle (radius), square (length of the side),
-            figure_eight (length along its axis), spline (points).
-        length: Length of a line, of a square's side, of a figure of eight [m].
-        direction_deg: Direction of a line from +x [deg]; with tangent heading only 0.
-        radius: Radius of an arc or circle [m].
-        angle_deg: Angle of an arc [deg], left positive.
-        points: Points [x, y] that a spline passes after the start [m].
-    """
-
-    type: Literal["path"] = "path"
-    name: Literal["line", "arc", "circle", "square", "figure_eight", "spline"]
-    length: Positive | None = None
-    direction_deg: Number | None = None
-    radius: Positive | None = None
-    angle_deg: Number | None = None
-    points: Annotated[tuple[tuple[Number, Number], ...] | None, Field(min_length=1)] = None
-
-    @model_validator(mode="after")
-    def _has_its_sizes(self) -> Self:
-        needs = {
-            **{name: {"length"} for name in ("line", "square", "figure_eight")},
-            **{"arc": {"radius", "angle_deg"}, "circle": {"radius"}, "spline": {"points"}},
-        }[self.name]
-        may = {*needs, "direction_deg"} if self.name == "line" else needs
-        for field in ("length", "direction_deg", "radius", "angle_deg", "points"):
-            if getattr(self, field) is None and field in needs:
-                raise ValueError(f"{field}: this field is required for a {self.name}")
-            if getattr(self, field) is not None and field not in may:
-                raise ValueError(f"{field}: a {self.name} has none; accepted: {', '.join(sorted(may))}")
-        return self
-
-    def problems(self, robot: Robot, duration: float, time_step: float) -> Iterator[Problem]:
-        """What the path cannot be."""
-        if self.direction_deg and self._tangent(robot):
-            message = "with tangent heading a line leads ahead; accepted: 0, or heading: fixed"
-            yield Problem(("command", "direction_deg"), message, self.direction_deg)
-        through = np.array([(0.0, 0.0), *(self.points or ())])
-        if (np.hypot(*np.diff(through, axis=0).T) < 1e-9).any():
-            message = "two points in a row are one (the start is [0, 0]); accepted: points apart from each other"
-            yield Problem(("command", "points"), message, self.points)
-            return
-        yield from super().problems(robot, duration, time_step)
-
-    def legs(self, robot: Robot) -> list[paths.Leg]:
-        """The path's legs."""
-        tangent = self._tangent(robot)
-        length, radius = self.length or 0.0, self.radius or 0.0
-        match self.name:
-            case "line":
-                direction = math.radians(self.direction_deg or 0.0)
-                return [paths.line((0, 0, 0), (length * math.cos(direction), length * math.sin(direction), 0))]
-            case "arc":
-                return [paths.arc(radius, math.radians(self.angle_deg or 0.0), tangent=tangent)]
-            case "circle":
-                return [paths.arc(radius, 2 * math.pi, tangent=tangent)]
-            case "square":
-                return paths.square(length, tangent=tangent)
-            case "figure_eight":
-                return [paths.figure_eight(length, tangent=tangent)]
-            case "spline":
-                return [paths.spline(self.points or (), tangent=tangent)]
-
-
 Command = Annotated[
     TwistCommand | WheelSpeedsCommand | WheelEffortsCommand | WaypointsCommand | PathCommand | GaitCommand,
     Field(discriminator="type"),
@@ -331,8 +186,3 @@ def _ramp_problems(ramp: float, duration: float) -> Iterator[Problem]:
     if 2 * ramp > duration:
         message = f"start and stop do not fit into duration = {duration}; accepted: up to {duration / 2:g}"
         yield Problem(("command", "ramp"), message, ramp)
-
-
-def _turning_radius(robot: Robot) -> float:
-    """Mean distance of the wheels from Bo [m]."""
-    return float(np.mean([np.hypot(*wheel.p_BoHo_B[:2]) for wheel in robot.wheels])) or 1.0

@@ -12,6 +12,7 @@ from rollerbench.errors import KinematicsError
 from rollerbench.kinematics.limits.cone_program import Cones, maximize, slack
 from rollerbench.kinematics.limits.contact_forces import Affine, ContactForces
 from rollerbench.kinematics.limits.efforts import constant_loads, least_norm
+from rollerbench.kinematics.limits.force_limits import friction_coefficients, limit_cones
 from rollerbench.kinematics.limits.result import Limit, finite_number, unit_vectors
 from rollerbench.kinematics.rows import wheeled
 
@@ -66,13 +67,13 @@ def max_acceleration(
     shape, u = unit_vectors(direction)
     _accept("adhesion", adhesion, ("circle", "independent"))
     _accept("sharing", sharing, ("best", "least_norm"))
-    friction = _friction(robot, ground_friction)
+    friction = friction_coefficients(robot, ground_friction)
     resistance = finite_number("roll_resistance", roll_resistance, smallest=0.0)
     model = ContactForces(robot, u, resistance, constant_loads(robot, loads))
     x, able = _in_balance(model) if sharing == "best" else _least_norm(model)
     # The acceleration must be free: a base without drive may be in balance with what slows it down.
     chosen = able & ~model.skids.any(axis=1) & (np.linalg.norm(x.slope[:, 0], axis=1) > OPEN * GRAVITY)
-    cones, owners, kinds = _cones(model, friction, adhesion)
+    cones, owners, kinds = limit_cones(model, friction, adhesion)
     value, cause, at_limit = _solve(
         Affine(constant=x.constant[chosen], slope=x.slope[chosen]),
         Cones(constant=cones.constant[chosen], slope=cones.slope[chosen]),
@@ -134,48 +135,6 @@ def _least_norm(model: ContactForces) -> tuple[Affine, NDArray[np.bool_]]:
     """As `_in_balance`, with the efforts of least norm at each acceleration."""
     x, able = least_norm(model)
     return Affine(constant=x.constant, slope=x.slope * GRAVITY), able
-
-
-def _cones(model: ContactForces, friction: Array, adhesion: str) -> tuple[Cones, NDArray[np.intp], NDArray[np.str_]]:
-    """Cones over x, scaled to about 1, with the wheel and the kind of each."""
-    robot, count = model.robot, len(model.u)
-    share = robot.mass * GRAVITY / len(robot.wheels)
-    constant, slope, owners, kinds = [], [], [], []
-    for wheel in np.flatnonzero(model.carrying).tolist():
-        bound = friction[wheel] * model.loads.constant[:, wheel] / share
-        bound_slope = friction[wheel] * model.loads.slope[:, wheel] / share
-        for axes in ((0, 1),) if adhesion == "circle" else ((0,), (1,)):
-            w, w_slope = np.zeros((count, 3)), np.zeros((count, 3, model.size))
-            w[:, 0], w_slope[:, 0] = bound, bound_slope
-            for axis in axes:
-                w[:, 1 + axis] = model.forces.constant[:, wheel, axis] / share
-                w_slope[:, 1 + axis] = model.forces.slope[:, wheel, axis] / share
-            constant.append(w)
-            slope.append(w_slope)
-            owners.append(wheel)
-            kinds.append("adhesion")
-    driven = [i for i, wheel in enumerate(robot.wheels) if wheel.driven]
-    for row, driver in enumerate(driven):
-        largest = robot.wheels[driver].max_effort
-        if largest is not None:
-            w, w_slope = np.zeros((count, 3)), np.zeros((count, 3, model.size))
-            w[:, 0] = 1.0
-            w[:, 1] = model.efforts.constant[:, row] / largest
-            w_slope[:, 1] = model.efforts.slope[:, row] / largest
-            constant.append(w)
-            slope.append(w_slope)
-            owners.append(driver)
-            kinds.append("effort")
-    cones = Cones(constant=np.stack(constant, axis=1), slope=np.stack(slope, axis=1))
-    return cones, np.array(owners, dtype=np.intp), np.array(kinds, dtype="<U9")
-
-
-def _friction(robot: Robot, ground: float | None) -> Array:
-    own = np.array([wheel.friction for wheel in robot.wheels])
-    if ground is None:
-        return own
-    ground = finite_number("ground_friction", ground, smallest=0.0)
-    return 2.0 * own * ground / (own + ground)
 
 
 def _accept(name: str, value: str, accepted: tuple[str, ...]) -> None:

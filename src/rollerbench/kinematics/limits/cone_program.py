@@ -51,6 +51,39 @@ def slack(w: Array) -> Array:
     return w[..., 0] - np.hypot(w[..., 1], w[..., 2])
 
 
+def section(constant: Array, slope: Array) -> tuple[Array, Array]:
+    """Where lines lie in cones: the t with |v(t)| <= s(t) for all w(t) = [s, v] = constant + slope t of a line.
+
+    |v|^2 <= s^2 is a quadratic inequality, which also the cone of -s fulfils.
+
+    Args:
+        constant: (..., m, 3).
+        slope: (..., m, 3).
+
+    Returns:
+        Smallest and largest t (...), infinite where nothing bounds it; the smallest is larger where there is no t.
+    """
+    signs = -SIGNS
+    a, b = np.sum(signs * slope**2, axis=-1), np.sum(signs * slope * constant, axis=-1)
+    c = np.sum(signs * constant**2, axis=-1)
+    root = np.sqrt(np.maximum(b * b - a * c, 0.0))
+    # The root that does not cancel first, then the other.
+    q = -(b + np.where(b < 0, -root, root))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ends = np.sort(np.stack([q / a, c / q]), axis=0)
+        middle = constant[..., 0] + slope[..., 0] * 0.5 * (ends[0] + ends[1])
+    s = slope[..., 0]
+    low = np.where(a > 0, ends[0], np.where(s > 0, ends[1], -np.inf))
+    high = np.where(a > 0, ends[1], np.where(s < 0, ends[0], np.inf))
+    # Lines that pass the cone by, lines within the other one, and lines along which nothing changes.
+    nowhere = (a > 0) & ((b * b < a * c) | (middle < 0))
+    still = (a == 0) & (b == 0)
+    nowhere |= still & ((c > 0) | (constant[..., 0] < 0))
+    low = np.where(nowhere, np.inf, np.where(still, -np.inf, low))
+    high = np.where(nowhere, -np.inf, np.where(still, np.inf, high))
+    return low.max(axis=-1), high.min(axis=-1)
+
+
 def maximize(objective: Array, cones: Cones) -> tuple[Array, NDArray[np.bool_]]:
     """Solves the programs.
 

@@ -79,10 +79,10 @@ def wheel_loads(robot: Robot | str | Path, direction: ArrayLike, acceleration: A
 
 
 def least_norm(model: ContactForces) -> tuple[Affine, NDArray[np.bool_]]:
-    """Unknowns x (d, n_x) by acceleration, with the efforts of least norm and then the side forces of least norm.
+    """Unknowns x (d, n_x) by accelerations, with the efforts of least norm and then the side forces of least norm.
 
     Returns:
-        x: Affine in [a].
+        x: Affine in the accelerations of the model.
         able: Whether (d,) the wheels can push that way.
     """
     mass = model.robot.mass
@@ -90,13 +90,14 @@ def least_norm(model: ContactForces) -> tuple[Affine, NDArray[np.bool_]]:
     # Forces in units of the weight, and moments by the farthest wheel: everything is about 1.
     scale = 1.0 / np.array([mass, mass, mass * arm])
     balance = Affine(constant=model.balance.constant * scale, slope=model.balance.slope * scale[:, np.newaxis])
-    drive = [1 + k for k, (_, axis) in enumerate(model.unknowns) if axis == 0]
-    side = [1 + k for k, (_, axis) in enumerate(model.unknowns) if axis == 1]
+    given = model.accelerations
+    drive = [given + k for k, (_, axis) in enumerate(model.unknowns) if axis == 0]
+    side = [given + k for k, (_, axis) in enumerate(model.unknowns) if axis == 1]
     names = [wheel.name for wheel in model.robot.driven_wheels]
     rows = [names.index(model.robot.wheels[i].name) for i, axis in model.unknowns if axis == 0]
-    # Right-hand sides by [1, a].
-    wanted = -np.stack([balance.constant, balance.slope[..., 0]], axis=-1)
-    own = np.stack([model.efforts.constant, model.efforts.slope[..., 0]], axis=-1)[:, rows]
+    # Right-hand sides by 1 and the accelerations.
+    wanted = -np.concatenate([balance.constant[..., np.newaxis], balance.slope[..., :given]], axis=-1)
+    own = np.concatenate([model.efforts.constant[..., np.newaxis], model.efforts.slope[..., :given]], axis=-1)[:, rows]
     lever = model.efforts.slope[:, rows, drive] if drive else np.ones((len(model.u), 0))
     by_effort = balance.slope[..., drive] * mass / lever[:, np.newaxis]
     by_side = balance.slope[..., side] * mass
@@ -109,8 +110,8 @@ def least_norm(model: ContactForces) -> tuple[Affine, NDArray[np.bool_]]:
     rest = wanted - by_effort @ ((efforts - own) / mass)
     sides = mass * side_inverse @ rest
     left = rest - by_side @ sides / mass
-    x = np.zeros((len(model.u), model.size, 2))
-    x[:, 0, 1] = 1.0
+    x = np.zeros((len(model.u), model.size, 1 + given))
+    x[:, range(given), range(1, 1 + given)] = 1.0
     x[:, drive], x[:, side] = pushes, sides
     able = np.max(np.abs(left), axis=(1, 2)) < OPEN * 10.0
     return Affine(constant=x[..., 0], slope=x[..., 1:]), able
