@@ -47,6 +47,20 @@ def cart() -> Data:
     }
 
 
+def car() -> Data:
+    """Two driven tyres behind, two steered ones in front that roll freely."""
+    return {
+        "name": "test_car",
+        "body": {**BODY, "size": [0.6, 0.3, 0.1], "center_of_mass": [0.2, 0.0, 0.03]},
+        "wheels": [
+            {**TYRE, "name": "rear_left", "position": [0.0, 0.2]},
+            {**TYRE, "name": "rear_right", "position": [0.0, -0.2]},
+            {**TYRE, "type": "steered", "name": "front_left", "position": [0.45, 0.2], "driven": False},
+            {**TYRE, "type": "steered", "name": "front_right", "position": [0.45, -0.2], "driven": False},
+        ],
+    }
+
+
 def kiwi(distance: float = 0.2) -> Data:
     """Three omni wheels 120 deg apart, axles through the centre."""
     places = {"front": (1.0, 0.0, 90.0), "left": (-0.5, 0.75**0.5, 210.0), "right": (-0.5, -(0.75**0.5), 330.0)}

@@ -49,7 +49,7 @@ def spline(points: ArrayLike, *, tangent: bool = False, yaw: ArrayLike | None = 
         x, y = rotate(-heading[0], place).T
         return x, y, heading - heading[0]
 
-    return leg(pose, tangent=tangent)
+    return leg(pose, tangent=tangent, by_length=True)
 
 
 def clothoid(

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import CubicSpline
 
 from rollerbench.kinematics.odometry import rotate
 
@@ -14,6 +15,9 @@ Array = NDArray[np.float64]
 
 NODES = 481
 """Samples of a leg's path, and of its twist over time."""
+
+FINE = 8
+"""Samples for every one of these by which a path's length is measured."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,10 +48,22 @@ class Leg:
 
 
 def leg(
-    pose: Callable[[Array], tuple[ArrayLike, ArrayLike, ArrayLike]], *, tangent: bool = False, nodes: int = NODES
+    pose: Callable[[Array], tuple[ArrayLike, ArrayLike, ArrayLike]],
+    *,
+    tangent: bool = False,
+    nodes: int = NODES,
+    by_length: bool = False,
 ) -> Leg:
-    """A leg from a function of u (k,) in 0..1 to x, y [m] and yaw [rad], by its values at a number of nodes."""
+    """A leg from a function of u (k,) in 0..1 to x, y [m] and yaw [rad], by its values at a number of nodes.
+
+    These are at equal steps of u, or by_length, at equal ways of Bo, so that it can be driven at an even speed.
+    """
     u = np.linspace(0, 1, nodes)
+    if by_length:
+        fine = np.linspace(0, 1, FINE * (nodes - 1) + 1)
+        x, y, _ = pose(fine)
+        way = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x), np.diff(y)))])
+        u = CubicSpline(way, fine)(u * way[-1]).clip(0.0, 1.0)
     return Leg(
         q_xyt=np.column_stack([np.broadcast_to(np.asarray(part, float), u.shape) for part in pose(u)]), tangent=tangent
     )
@@ -94,15 +110,15 @@ def figure_eight(size: float, *, tangent: bool) -> Leg:
         yaw = np.unwrap(np.arctan2(np.cos(2 * t), np.cos(t))) - 0.25 * np.pi
         return x, y, yaw if tangent else 0.0
 
-    return leg(pose, tangent=tangent)
+    return leg(pose, tangent=tangent, by_length=True)
 
 
 def laps(legs: Sequence[Leg], count: int) -> list[Leg]:
     """A closed path several times: one leg without a rest in between, or several legs one after the other."""
     turn = legs[-1].q_xyt[-1, 2] - legs[0].q_xyt[0, 2]
-    rounds = [[leg.q_xyt + [0.0, 0.0, lap * turn] for leg in legs] for lap in range(count)]
+    rounds = [[each.q_xyt + np.array([0.0, 0.0, lap * turn]) for each in legs] for lap in range(count)]
     if len(legs) > 1:
-        return [replace(leg, q_xyt=q) for each in rounds for leg, q in zip(legs, each, strict=True)]
+        return [replace(each, q_xyt=q) for poses in rounds for each, q in zip(legs, poses, strict=True)]
     joined = [rounds[0][0], *(each[0][1:] for each in rounds[1:])]
     return [replace(legs[0], q_xyt=np.concatenate(joined))]
 
