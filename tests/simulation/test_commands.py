@@ -62,6 +62,14 @@ def test_time_optimal_runs_go_at_once_and_then_rest() -> None:
     assert scenario.motion.wheel_speeds.peak.max() == pytest.approx(0.8 * 30.0, rel=1e-3)
 
 
+def test_steered_wheels_turn_in_the_rests_of_time_optimal_legs() -> None:
+    command = {"type": "waypoints", "waypoints": [[1, 0], [1, 1, 90]], "speed_law": "time_optimal", "margin": 0.9}
+    motion = rb.load_scenario({**BASE, "robot": "swerve_base", "command": command}).motion
+    assert motion.steers
+    assert motion.steering_angles.peak_rate.max() < 15.0
+    assert motion.wheel_speeds.peak.max() <= 0.9 * 60.0
+
+
 @pytest.mark.parametrize(("limit", "value"), [("effort", {"max_effort": 1.5}), ("adhesion", {"friction": 0.3})])
 def test_a_cart_in_drake_uses_its_limits_as_planned(limit: str, value: dict[str, float]) -> None:
     """Wheel speeds exactly; efforts within 1 % for 98 % of the time: the step of the acceleration rings shortly."""

@@ -89,7 +89,7 @@ def twist_motion(kinematics: WheelKinematics, twist: Profile, *, project: bool =
         )
     times = _samples(twist)
     names = [wheel.name for wheel in robot.steered_wheels]
-    angles = _steering(kinematics, twist(times))
+    angles = _steering(kinematics, times, twist(times))
     start = kinematics.swivelled({name: float(angle) for name, angle in zip(names, angles[0], strict=True)})
     if names and np.ptp(angles, axis=0).max() > 1e-9:
         return _steering_motion(start, twist, times, angles)
@@ -123,8 +123,8 @@ def _steering_motion(start: WheelKinematics, twist: Profile, times: Array, angle
     )
 
 
-def _steering(kinematics: WheelKinematics, twists: Array) -> Array:
-    """Steering angles (n, n_steered) along twists (n, 3); before the first motion those that it starts with."""
+def _steering(kinematics: WheelKinematics, times: Array, twists: Array) -> Array:
+    """Steering angles (n, n_steered) at times (n,) along twists (n, 3); at first those that the motion starts with."""
     n_steered = len(kinematics.robot.steered_wheels)
     angles = np.zeros((len(twists), n_steered))
     if not n_steered:
@@ -137,7 +137,7 @@ def _steering(kinematics: WheelKinematics, twists: Array) -> Array:
     # One after the other: each wheel turns from where it was, at rest evenly to where the next motion needs it.
     for last, row in itertools.pairwise(moving):
         angles[row] = kinematics.steering(twists[row], previous=angles[last])[0]
-        share = np.arange(1, row - last)[:, np.newaxis] / (row - last)
+        share = (times[last + 1 : row, np.newaxis] - times[last]) / (times[row] - times[last])
         s = share**2 * (3 - 2 * share)
         angles[last + 1 : row] = angles[last] + s * (angles[row] - angles[last])
     angles[moving[-1] :] = angles[moving[-1]]

@@ -92,7 +92,9 @@ def time_optimal(
 
     Its driven wheels keep their max_speed and max_effort, steered ones their max_steering_speed, and no wheel needs
     more than its friction times its load, which the acceleration shifts (see `path_limits` and `reachability`).
-    Steered tyres and castors follow their way at once: what it takes to swivel them is left out.
+    Steered tyres and castors follow their way at once: what it takes to swivel them is left out, and so is what it
+    takes to spin up each roller as it touches the ground. Simulated Mecanum wheels need some percent more effort for
+    that, and their loads come and go with the rollers: a margin of 0.8 leaves room.
 
     Args:
         robot: Robot, name of a shipped one, or path to a robot.yaml.
