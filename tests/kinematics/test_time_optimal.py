@@ -62,7 +62,8 @@ def test_a_limit_is_reached_at_every_moment_and_none_exceeded(name: str) -> None
     assert set(run.active) <= run.usage.keys() <= {"speed", "steering", "adhesion", "effort"}
     # The twist leads to the end of the path, and its wheels keep their speeds.
     time = np.linspace(0, run.duration, 2001)
-    assert reference_poses(run.twist, time)[-1] == pytest.approx(legs[-1].q_xyt[-1], abs=2e-5)
+    # Sharp corners cost the most: between two breaks the change of their curvature jumps.
+    assert reference_poses(run.twist, time)[-1] == pytest.approx(legs[-1].q_xyt[-1], abs=5e-5)
     kinematics = rb.WheelKinematics(robot)
     if not kinematics.robot.steered_wheels:
         limits = [wheel.max_speed for wheel in kinematics.robot.driven_wheels]
