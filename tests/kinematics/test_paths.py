@@ -103,7 +103,7 @@ sides = st.lists(st.floats(0.2, 3.0), min_size=5, max_size=5)
 
 
 @given(turns, sides, st.floats(0.01, 1.0), st.floats(-3.0, 3.0))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=10, deadline=None)
 def test_a_clothoid_path_rounds_its_corners_evenly(
     corners: list[float], lengths: list[float], deviation: float, start: float
 ) -> None:

@@ -71,7 +71,7 @@ def test_a_limit_is_reached_at_every_moment_and_none_exceeded(name: str) -> None
 
 
 @given(st.floats(-3.2, 3.2))
-@settings(max_examples=4, deadline=None)
+@settings(max_examples=2, deadline=None)
 def test_straight_runs_start_and_cruise_at_the_limits_of_their_direction(direction: float) -> None:
     u = np.array([math.cos(direction), math.sin(direction)])
     for name in ("youbot_base", "kiwi"):
@@ -112,9 +112,9 @@ def test_margins_rates_and_friction_slow_it_down() -> None:
 
 
 def test_legs_follow_each_other_with_rests() -> None:
-    legs = paths.square(1.0, tangent=False)
-    run, resting = (paths.time_optimal("kiwi", legs, pause=pause) for pause in (0.0, 0.9))
-    assert resting.duration == pytest.approx(run.duration + 0.9)
+    legs = paths.square(1.0, tangent=False)[:2]
+    run, resting = (paths.time_optimal("kiwi", legs, pause=pause) for pause in (0.0, 0.3))
+    assert resting.duration == pytest.approx(run.duration + 0.3)
     assert (np.diff(resting.twist.breaks) > 0).all()
     corner = paths.time_optimal("kiwi", legs[:1]).duration
     assert resting.twist(np.linspace(corner + 1e-3, corner + 0.299, 9)) == pytest.approx(np.zeros((9, 3)), abs=1e-9)
@@ -137,7 +137,7 @@ def test_contact_forces_on_a_curve_are_those_of_the_rigid_body(make: Any) -> Non
 
 
 @given(st.integers(0, 2**32 - 1))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=8, deadline=None)
 def test_lines_through_cones_end_at_the_optimum_of_the_cone_program(seed: int) -> None:
     rng = np.random.default_rng(seed)
     constant, slope = rng.normal(size=(10, 5, 3)), 0.5 * rng.normal(size=(10, 5, 3))
@@ -163,7 +163,7 @@ def test_the_time_is_that_of_an_independent_program(robot: Any, leg: Any, sharin
     """Verscheure et al. (2009) by Clarabel: friction circles exact, midpoints, the leg's own parameter."""
     robot = rb.load_robot(robot)
     found = paths.time_optimal(robot, [leg], sharing=sharing).duration
-    assert found == pytest.approx(independent_time(robot, leg, sharing, count=120), rel=0.01)
+    assert found == pytest.approx(independent_time(robot, leg, sharing, count=80), rel=0.01)
 
 
 def independent_time(robot: rb.Robot, leg: Any, sharing: str, count: int) -> float:
