@@ -82,7 +82,7 @@ def test_a_cart_in_drake_uses_its_limits_as_planned(limit: str, value: dict[str,
             **{"ground": {"friction": value.get("friction", 0.8)}, "command": {**path, "margin": 0.9}},
         }
     )
-    fastest = scenario.command.fastest(scenario.robot)
+    fastest = scenario.fastest
     assert fastest.usage[limit].max() == pytest.approx(0.9, rel=1e-3)
     recording = rb.run(scenario, save=False).recording
     assert (np.abs(recording.wheels("measured")[:, :2]) <= 0.9 * 15.0 * 1.002).all()
@@ -94,6 +94,21 @@ def test_a_cart_in_drake_uses_its_limits_as_planned(limit: str, value: dict[str,
     # Without slip: friction has what it needs.
     slip = np.hypot(recording.wheels("slip_x"), recording.wheels("slip_y"))[:, :2]
     assert np.percentile(slip[moving], 98) < 0.01
+
+
+def test_time_optimal_commands_know_the_ground() -> None:
+    path = {"type": "path", "name": "line", "length": 0.2, "speed_law": "time_optimal"}
+    data = {**BASE, "duration": 4.0, "command": path}
+    dry, icy = (
+        rb.load_scenario({**data, "ground": {"friction": friction}}).fastest.duration for friction in (0.8, 0.1)
+    )
+    # Grip alone limits both: times go by the root of the combined friction, but for loads that accelerations shift.
+    combined = [2 * 0.8 * ground / (0.8 + ground) for ground in (0.8, 0.1)]
+    assert icy / dry == pytest.approx(math.sqrt(combined[0] / combined[1]), rel=0.1)
+    with pytest.raises(rb.DescriptionError, match=r"ground.slope_deg = 5.* level ground"):
+        rb.load_scenario({**data, "ground": {"slope_deg": 5.0}})
+    with pytest.raises(rb.DescriptionError, match="at least; accepted: a duration of that or more"):
+        rb.load_scenario({**data, "duration": 0.1})
 
 
 def test_pieces_follow_each_other() -> None:

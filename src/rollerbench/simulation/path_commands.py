@@ -13,6 +13,7 @@ from rollerbench.description.problems import Problem
 from rollerbench.errors import KinematicsError
 from rollerbench.kinematics import WheelKinematics, paths
 from rollerbench.kinematics.profile import Profile
+from rollerbench.simulation.settings import Ground
 
 STEERING_PAUSE = 0.5
 """Rest between the legs of a path in which steered wheels turn to the next [s]."""
@@ -20,7 +21,7 @@ STEERING_PAUSE = 0.5
 Infeasible = Literal["refuse", "project"]
 
 
-class _AlongPath(Part):
+class AlongPath(Part):
     """What commands that follow a path share.
 
     Attributes:
@@ -33,7 +34,6 @@ class _AlongPath(Part):
             and grip of the wheels allow (`rollerbench.paths.time_optimal`), then at rest for what is left of the time.
         margin: Share of these limits that time_optimal may use [-]; 1 by default. Controllers need the rest.
         wheel_acceleration: Largest rate of the driven wheels' speeds for time_optimal [rad/s2].
-        ground_friction: Coefficient of friction of the ground for time_optimal; by default as that of each wheel.
         infeasible: "refuse" a twist at which a tyre would skid, or "project" it on what is feasible.
     """
 
@@ -42,13 +42,12 @@ class _AlongPath(Part):
     speed_law: paths.SpeedLaw | Literal["time_optimal"] = "trapezoidal"
     margin: Annotated[Positive, Field(le=1)] | None = None
     wheel_acceleration: Positive | None = None
-    ground_friction: Positive | None = None
     infeasible: Infeasible = "refuse"
 
     @model_validator(mode="after")
     def _limits_belong_to_their_law(self) -> Self:
         fits = self.speed_law == "time_optimal"
-        for field in ("speed",) if fits else ("margin", "wheel_acceleration", "ground_friction"):
+        for field in ("speed",) if fits else ("margin", "wheel_acceleration"):
             if getattr(self, field) is not None:
                 accepted = "the robot's limits instead, or a margin" if fits else "with speed_law: time_optimal only"
                 raise ValueError(f"{field}: not with speed_law: {self.speed_law}; accepted: {accepted}")
@@ -72,9 +71,7 @@ class _AlongPath(Part):
                 f"the rests in which its wheels steer take {self._pause(robot, legs):g} s; accepted: a longer duration"
             )
             yield Problem(("command",), message)
-        elif self.speed_law == "time_optimal":
-            yield from self._fastest_problems(robot, duration)
-        elif self.speed is not None:
+        elif self.speed is not None and self.speed_law != "time_optimal":
             needed = paths.fastest_duration(legs, self.speed, self.speed_law, _turning_radius(robot))
             needed += self._pause(robot, legs)
             if needed > duration:
@@ -84,14 +81,13 @@ class _AlongPath(Part):
     def twist(self, robot: Robot, duration: float, time_step: float) -> Profile:
         """Body twist (3) over time."""
         legs, radius = self.legs(robot), _turning_radius(robot)
-        if self.speed_law == "time_optimal":
-            return self.fastest(robot).twist
+        assert self.speed_law != "time_optimal"  # see fastest
         if self.speed is not None:
             duration = paths.fastest_duration(legs, self.speed, self.speed_law, radius) + self._pause(robot, legs)
         return paths.twist_along(legs, duration, self.speed_law, radius, pause=self._pause(robot, legs))
 
-    def fastest(self, robot: Robot) -> paths.TimeOptimal:
-        """The time-optimal motion along the path.
+    def fastest(self, robot: Robot, ground: Ground) -> paths.TimeOptimal:
+        """The time-optimal motion along the path on level ground.
 
         Raises:
             KinematicsError: the robot cannot follow the path.
@@ -101,22 +97,11 @@ class _AlongPath(Part):
             robot,
             legs,
             margin=self.margin or 1.0,
-            ground_friction=self.ground_friction,
+            ground_friction=ground.friction,
+            roll_resistance=ground.roll_resistance,
             wheel_acceleration=self.wheel_acceleration,
             pause=self._pause(robot, legs),
         )
-
-    def _fastest_problems(self, robot: Robot, duration: float) -> Iterator[Problem]:
-        try:
-            needed = self.fastest(robot).duration
-        except KinematicsError as error:
-            yield Problem(("command",), str(error))
-            return
-        if needed > duration:
-            message = (
-                f"the path takes {math.ceil(1e3 * needed) / 1e3:g} s at least; accepted: a duration of that or more"
-            )
-            yield Problem(("duration",), message, duration)
 
     def _pause(self, robot: Robot, legs: list[paths.Leg]) -> float:
         """Time of all rests between legs, in which steered wheels turn [s]."""
@@ -128,7 +113,7 @@ class _AlongPath(Part):
         return WheelKinematics(robot).mobility().degree_of_manoeuvrability < 3
 
 
-class WaypointsCommand(_AlongPath):
+class WaypointsCommand(AlongPath):
     """Straight lines from waypoint to waypoint, with a rest at each.
 
     Attributes:
@@ -151,7 +136,7 @@ CLOSED = ("circle", "square", "figure_eight")
 """Paths that end where they begin."""
 
 
-class PathCommand(_AlongPath):
+class PathCommand(AlongPath):
     """A named path from the start.
 
     Attributes:

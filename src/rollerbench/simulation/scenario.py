@@ -2,7 +2,7 @@
 
 import copy
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -22,13 +22,16 @@ from rollerbench.kinematics import WheelKinematics
 from rollerbench.kinematics.bumps import Bumps
 from rollerbench.kinematics.dynamics import RollingDynamics
 from rollerbench.kinematics.motion import Motion, effort_motion, twist_motion, wheel_motion
+from rollerbench.kinematics.paths import TimeOptimal
 from rollerbench.kinematics.profile import reference_poses
 from rollerbench.resources import scenario_file
 from rollerbench.sdf.window import size_on_bumps
 from rollerbench.simulation.commands import Command, WheelEffortsCommand, WheelSpeedsCommand
 from rollerbench.simulation.imperfections import Errors
 from rollerbench.simulation.leg_command import GaitCommand
+from rollerbench.simulation.path_commands import AlongPath
 from rollerbench.simulation.rehearsal import Rehearsal, rehearse
+from rollerbench.simulation.scenario_problems import scenario_problems
 from rollerbench.simulation.settings import (
     Controller,
     Ground,
@@ -102,23 +105,7 @@ class Scenario(Part):
 
     @model_validator(mode="after")
     def _command_fits(self) -> Self:
-        problems = list(self.command.problems(self.robot, self.duration, self.plant.time_step))
-        problems += self.errors.problems(self.robot)
-        problems += _leg_problems(self) if self.robot.legs else _wheel_problems(self)
-        if self.wheel_control.pid is not None and self.wheel_control.servo != "pid":
-            problems.append(Problem(("controller", "pid"), "gains without their controller; accepted: with servo: pid"))
-        if isinstance(self.command, WheelEffortsCommand) and self.ground.slope_deg:
-            message = "torques have a reference on level ground only; accepted: 0, or another command"
-            problems.append(Problem(("ground", "slope_deg"), message, self.ground.slope_deg))
-        if isinstance(self.command, WheelEffortsCommand) and self.errors.drives(self.robot) is not None:
-            message = (
-                "torques do not go through a drivetrain; accepted: without gear_error, backlash_deg, encoder_counts"
-            )
-            problems.append(Problem(("errors",), message))
-        if self.plant.time_step > self.duration:
-            message = f"accepted: at most the duration, {self.duration:g}"
-            problems.append(Problem(("plant", "time_step"), message, self.plant.time_step))
-        refuse(problems)
+        refuse(list(scenario_problems(self)))
         return self
 
     @property
@@ -175,6 +162,21 @@ class Scenario(Part):
         bumps = self.errors.ground_bumps
         return max(self.plant.roller_window, 0 if bumps is None else size_on_bumps(self.simulated_robot, bumps.height))
 
+    @property
+    def is_time_optimal(self) -> bool:
+        """Whether the speed of the command is time-optimal."""
+        return isinstance(self.command, AlongPath) and self.command.speed_law == "time_optimal"
+
+    @cached_property
+    def fastest(self) -> TimeOptimal:
+        """The motion of a command whose speed is time-optimal.
+
+        Raises:
+            KinematicsError: the robot cannot follow the path.
+        """
+        assert isinstance(self.command, AlongPath)
+        return self.command.fastest(self.robot, self.ground)
+
     @cached_property
     def motion(self) -> Motion:
         """What the controller makes of the command.
@@ -195,7 +197,9 @@ class Scenario(Part):
             speeds = self.command.wheel_speed_profile(self.robot, self.duration, self.plant.time_step)
             motion = wheel_motion(kinematics, speeds)
         else:
-            twist = self.command.twist(self.robot, self.duration, self.plant.time_step)
+            step = self.plant.time_step
+            optimal = self.is_time_optimal
+            twist = self.fastest.twist if optimal else self.command.twist(self.robot, self.duration, step)
             motion = twist_motion(kinematics, twist, project=self.command.infeasible == "project")
         self._require_speeds(motion)
         return motion
@@ -232,65 +236,6 @@ class Scenario(Part):
             return math.inf, None
         name = min(limits, key=limits.__getitem__)
         return float(limits[name]), name
-
-
-def _wheel_problems(scenario: Scenario) -> Iterator[Problem]:
-    if not scenario.robot.driven_wheels:
-        yield Problem(("robot",), "no wheel is driven; accepted: a robot with driven: true somewhere")
-    if isinstance(scenario.controller, LegControl):
-        message = "the robot has no legs; accepted: open_loop, pose_tracking"
-        yield Problem(("controller", "type"), message, scenario.controller.type)
-    if scenario.tracking is not None:
-        yield from _tracking_problems(scenario, scenario.tracking)
-    if scenario.ground.steps:
-        yield Problem(("ground", "steps"), "for robots on legs only; accepted: errors.ground_bumps for wheels")
-
-
-def _tracking_problems(scenario: Scenario, tracking: PoseTracking) -> Iterator[Problem]:
-    yield from _period_problems(scenario, tracking.period)
-    if isinstance(scenario.command, WheelEffortsCommand):
-        message = "torques are given, so none are left to feedback; accepted: twist, wheel_speeds, waypoints, path"
-        yield Problem(("command", "type"), message, scenario.command.type)
-    if scenario.engine != "drake":
-        message = "feedback of the pose is simulated by Drake only; accepted: drake, or controller: open_loop"
-        yield Problem(("engine",), message, scenario.engine)
-    if tracking.max_wheel_jerk is not None and tracking.max_wheel_acceleration is None:
-        yield Problem(
-            ("controller", "max_wheel_jerk"), "accepted: with max_wheel_acceleration", tracking.max_wheel_jerk
-        )
-
-
-def _period_problems(scenario: Scenario, period: float) -> Iterator[Problem]:
-    step = scenario.plant.time_step
-    if abs(period / step - round(period / step)) > 1e-6 or period < step * (1 - 1e-9):
-        message = f"accepted: a multiple of the plant's step, {step:g}"
-        yield Problem(("controller", "period"), message, period)
-
-
-def _leg_problems(scenario: Scenario) -> Iterator[Problem]:
-    name, control = scenario.robot.name, scenario.controller
-    if not isinstance(scenario.command, GaitCommand):
-        yield Problem(("command", "type"), f"{name} stands on legs; accepted: gait", scenario.command.type)
-    if isinstance(control, WheelControl) and control != OpenLoop():
-        yield Problem(("controller", "type"), f"{name} stands on legs; accepted: legs", control.type)
-    yield from _period_problems(scenario, scenario.leg_control.period)
-    if scenario.engine != "drake":
-        yield Problem(
-            ("engine",), f"{name} stands on legs, which only Drake simulates; accepted: drake", scenario.engine
-        )
-    lift = scenario.command.lift if isinstance(scenario.command, GaitCommand) else math.inf
-    for index, rise in enumerate(scenario.ground.steps):
-        if rise.height >= lift:
-            message = f"feet are lifted by {lift:g} m; accepted: less, or a larger command.lift"
-            yield Problem(("ground", "steps", index, "height"), message, rise.height)
-        wheels = max(leg.wheel.radius for leg in scenario.robot.legs)
-        first, last = scenario.robot.contact_points_B[:, 0].max() + wheels, scenario.robot.contact_points_B[:, 0].min()
-        if rise.start < first and rise.end > last - wheels:
-            message = f"feet stand there at the start; accepted: {first:.3g} or more"
-            yield Problem(("ground", "steps", index, "start"), message, rise.start)
-    if scenario.ground.roll_resistance:
-        message = "of wheels only; accepted: 0 for a robot on legs"
-        yield Problem(("ground", "roll_resistance"), message, scenario.ground.roll_resistance)
 
 
 def load_scenario(
