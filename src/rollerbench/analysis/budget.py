@@ -21,6 +21,9 @@ Array = NDArray[np.float64]
 SMALL = 1e-6
 """Errors below this are not shared out among parts [m, rad]."""
 
+LARGEST_SHARE = 10.0
+"""Where parts that cancel are larger than this times the error, as with feedback, shares would say nothing [-]."""
+
 MEANINGS = {
     "feedback": "what feedback of the pose commanded besides the reference, against the other parts",
     "servo": "wheels that did not turn as commanded",
@@ -64,10 +67,12 @@ class ErrorBudget:
 
         x, y [m] and yaw [rad] in W; along_track and cross_track [m] as in `PoseError`; position_share is the part of
         the error vector's length that this part makes up, yaw_share that of the yaw error: each adds up to 1. They are
-        None where the error is too small to be shared out.
+        None where the error is too small to be shared out: below a micrometre or microradian, or where parts cancel.
         """
-        total = self.total[-1]
-        length = float(np.hypot(*total[:2]))
+        total, last = self.total[-1], np.array([part[-1] for part in self.parts.values()])
+        length, turn = float(np.hypot(*total[:2])), abs(float(total[2]))
+        shared = length > SMALL and np.hypot(*last[:, :2].T).max() < LARGEST_SHARE * length
+        yaw_shared = turn > SMALL and np.abs(last[:, 2]).max() < LARGEST_SHARE * turn
         ahead = np.array([np.cos(self.direction), np.sin(self.direction)])
         left = np.array([-ahead[1], ahead[0]])
         return {
@@ -77,8 +82,8 @@ class ErrorBudget:
                 "yaw": float(part[-1, 2]),
                 "along_track": float(part[-1, :2] @ ahead),
                 "cross_track": float(part[-1, :2] @ left),
-                "position_share": float(part[-1, :2] @ total[:2]) / length**2 if length > SMALL else None,
-                "yaw_share": float(part[-1, 2] / total[2]) if abs(total[2]) > SMALL else None,
+                "position_share": float(part[-1, :2] @ total[:2]) / length**2 if shared else None,
+                "yaw_share": float(part[-1, 2] / total[2]) if yaw_shared else None,
             }
             for name, part in self.parts.items()
         }

@@ -1,6 +1,7 @@
 """A picture of the diagram that a scenario simulates."""
 
 import importlib.util
+import re
 
 from rollerbench.errors import ResourceError
 from rollerbench.simulation.scenario import Scenario
@@ -27,4 +28,5 @@ def diagram_svg(scenario: Scenario) -> str:
     station.set_name(scenario.name)
     graph = pygraphviz.AGraph(string=station.GetGraphvizString(max_depth=1))
     svg: bytes = graph.draw(format="svg", prog="dot")
-    return svg.decode("utf-8")
+    # Without a size of its own the picture takes that of the window.
+    return re.sub(r'(<svg) width="[^"]*" height="[^"]*"', r"\1", svg.decode("utf-8"), count=1)
