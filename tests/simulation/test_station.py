@@ -123,3 +123,10 @@ def test_a_reference_from_outside_is_tracked_as_one_of_the_scenario() -> None:
     simulator, context = started(builder.Build())
     simulator.AdvanceTo(0.6)
     assert_allclose(station.GetOutputPort("pose").Eval(station.GetMyContextFromRoot(context)), expected, atol=1e-12)
+
+
+@pytest.mark.parametrize(("robot", "command"), [("kiwi", "other"), ("wheel_leg_hexapod", "rest")])
+def test_unknown_commands_are_refused(robot: str, command: str) -> None:
+    each = "hexapod_stand" if robot == "wheel_leg_hexapod" else scenario(robot)
+    with pytest.raises(rb.SimulationError, match=f"command = '{command}': accepted: 'scenario', 'external'"):
+        rb.build_station(each, command=command)

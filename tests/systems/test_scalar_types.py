@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from pydrake.autodiffutils import AutoDiffXd, ExtractValue
 from pydrake.symbolic import Evaluate, Expression, Jacobian, MakeVectorVariable
-from pydrake.systems.framework import Diagram, System, System_
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import Diagram, DiagramBuilder, System, System_
+from pydrake.systems.primitives import ConstantVectorSource, Integrator
 
 import robots
 import rollerbench as rb
@@ -92,6 +94,23 @@ def _state(context: Any) -> list[Any]:
     groups = context.num_discrete_state_groups()
     vectors = [context.get_mutable_discrete_state(group) for group in range(groups)]
     return vectors + ([context.get_mutable_continuous_state_vector()] if context.num_continuous_states() else [])
+
+
+@pytest.mark.parametrize("case", ALGEBRAIC)
+def test_they_go_together_with_continuous_states(case: str) -> None:
+    """Drake's SymbolicVectorSystem would end the process."""
+    builder = DiagramBuilder()
+    system = builder.AddSystem(ALGEBRAIC[case]())
+    for index in range(system.num_input_ports()):
+        port = system.get_input_port(index)
+        values = np.full(port.size(), 0.1)
+        builder.Connect(builder.AddSystem(ConstantVectorSource(values)).get_output_port(), port)
+    output = system.get_output_port(0)
+    integrator = builder.AddSystem(Integrator(output.size()))
+    builder.Connect(output, integrator.get_input_port())
+    simulator = Simulator(builder.Build())
+    simulator.AdvanceTo(0.1)
+    assert np.isfinite(simulator.get_context().get_continuous_state_vector().CopyToVector()).all()
 
 
 @pytest.mark.parametrize("case", ALGEBRAIC)

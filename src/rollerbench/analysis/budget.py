@@ -25,7 +25,7 @@ LARGEST_SHARE = 10.0
 """Where parts that cancel are larger than this times the error, as with feedback, shares would say nothing [-]."""
 
 MEANINGS = {
-    "feedback": "what feedback of the pose commanded besides the reference, against the other parts",
+    "feedback": "what feedback added to the command; it works against the other parts",
     "servo": "wheels that did not turn as commanded",
     "drivetrain": "gears, play and encoders between motors and wheels",
     "radius_scale": "injected: wheel radii",

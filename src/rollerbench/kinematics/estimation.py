@@ -37,7 +37,7 @@ from rollerbench.description import Robot
 from rollerbench.errors import KinematicsError
 from rollerbench.kinematics.belief import Belief, Fix, Interval, Rates, Three, Variances, crossed, with_fix
 from rollerbench.kinematics.uncertainty import UPPER, GyroNoise, OdometryNoise, checked_covariance
-from rollerbench.kinematics.wheels import WheelKinematics
+from rollerbench.kinematics.wheels import WheelKinematics, held_kinematics
 
 Array = NDArray[np.float64]
 
@@ -136,10 +136,10 @@ class PoseFilter:
                 may refuse good fixes for long.
 
         Raises:
-            KinematicsError: an argument is not accepted.
+            KinematicsError: an argument is not accepted, or the robot steers wheels.
         """
         deviation = _checked(time_step, gyro, fix_deviation, largest_latency, gate)
-        self.kinematics = robot if isinstance(robot, WheelKinematics) else WheelKinematics(robot)
+        self.kinematics = held_kinematics(robot)
         self.time_step = time_step
         self.latency_steps = math.ceil(largest_latency / time_step - SNAP)
         self._gate, self._bias_variance = gate, gyro.bias_deviation**2

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 from pydrake.geometry import Meshcat, SceneGraph
@@ -9,6 +10,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Diagram, DiagramBuilder, OutputPort
 from pydrake.systems.primitives import LogVectorOutput, MatrixGain, VectorLogSink
 
+from rollerbench.errors import SimulationError
 from rollerbench.plant import RobotModel, add_ground, add_robot
 from rollerbench.simulation.drake_config import add_plant
 from rollerbench.simulation.leg_station import LegStation
@@ -43,8 +45,8 @@ class Station(Diagram):
     """A robot on its ground, driven by a scenario's command.
 
     Where rollers are windowed, as they are by default, call `follow_rollers(simulator)` before the simulation. With
-    all rollers, and without slip, rolling resistance and steering on the way, all systems are Drake's own, and
-    ToAutoDiffXd() converts it.
+    all rollers, and without slip, rolling resistance and steering on the way, ToAutoDiffXd() converts it; but Drake's
+    contacts of rollers are for floats only, so that such a plant can be evaluated and not stepped.
 
     Input ports, only if the command comes from outside, and then the one that fits the scenario:
         twist_command (3): body twist [m/s, m/s, rad/s]; where the scenario commands a twist, waypoints or a path.
@@ -153,8 +155,15 @@ def build_station(
             robots on wheels, holds these.
         meshcat: Where to show the robot.
         slip: Whether robots on wheels export slip and normal_forces, which no AutoDiffXd can tell.
+
+    Raises:
+        SimulationError: the command is none of these.
+        DescriptionError, InfeasibleTwist: as of `Station`.
     """
     loaded = load_scenario(scenario)
+    accepted = get_args(CommandFrom)[: 2 if loaded.robot.legs else 3]
+    if command not in accepted:
+        raise SimulationError(f"build_station: command = {command!r}: accepted: {', '.join(map(repr, accepted))}")
     if loaded.robot.legs:
         return LegStation(loaded, command="scenario" if command == "scenario" else "external", meshcat=meshcat)
     return Station(loaded, command=command, meshcat=meshcat, slip=slip)
@@ -199,6 +208,8 @@ def _add_odometry(
     builder: DiagramBuilder, scenario: Scenario, outputs: dict[str, OutputPort], motors: Motors, *, steered: bool
 ) -> Odometry | SteeredOdometry:
     kinematics, step = scenario.motion.kinematics, scenario.plant.time_step
+    if steered and scenario.tracking is not None:
+        step = scenario.tracking.period
     if not steered:
         odometry = builder.AddNamedSystem("odometry", Odometry(kinematics, step))
     else:

@@ -6,11 +6,12 @@ from collections.abc import Sequence
 import numpy as np
 from pydrake import symbolic
 from pydrake.symbolic import Expression, Variable
-from pydrake.systems.framework import Diagram, DiagramBuilder
-from pydrake.systems.primitives import Multiplexer, SymbolicVectorSystem
+from pydrake.systems.framework import Diagram, DiagramBuilder, System
+from pydrake.systems.primitives import Multiplexer
 
 from rollerbench.errors import KinematicsError
 from rollerbench.kinematics.drivetrain import WheelDrive
+from rollerbench.systems.symbolic_block import symbolic_block
 
 
 class Drivetrain(Diagram):
@@ -65,11 +66,11 @@ class Drivetrain(Diagram):
         builder.BuildInto(self)
 
 
-def _play(drives: Sequence[WheelDrive], time_step: float) -> SymbolicVectorSystem:
+def _play(drives: Sequence[WheelDrive], time_step: float) -> System:
     """From the commands to the leads g."""
     leads, commands = (_variables(name, len(drives)) for name in ("lead", "command"))
     crossings = [_crossing(*each, time_step) for each in zip(drives, leads, commands, strict=True)]
-    return SymbolicVectorSystem(
+    return symbolic_block(
         state=leads,
         input=commands,
         dynamics=[lead + crossing for lead, crossing in zip(leads, crossings, strict=True)],
@@ -78,15 +79,15 @@ def _play(drives: Sequence[WheelDrive], time_step: float) -> SymbolicVectorSyste
     )
 
 
-def _shaft(drives: Sequence[WheelDrive]) -> SymbolicVectorSystem:
+def _shaft(drives: Sequence[WheelDrive]) -> System:
     """From the wheels' angles to the shafts'."""
     angles = _variables("angle", len(drives))
-    return SymbolicVectorSystem(
+    return symbolic_block(
         input=angles, output=[_shaft_angle(drive, angle) for drive, angle in zip(drives, angles, strict=True)]
     )
 
 
-def _gear(drives: Sequence[WheelDrive], time_step: float) -> SymbolicVectorSystem:
+def _gear(drives: Sequence[WheelDrive], time_step: float) -> System:
     """From [shaft angles; leads; commands] to the speeds of the servos."""
     shafts, leads, commands = (_variables(name, len(drives)) for name in ("shaft", "lead", "command"))
     speeds = []
@@ -94,10 +95,10 @@ def _gear(drives: Sequence[WheelDrive], time_step: float) -> SymbolicVectorSyste
         turn = time_step * command - _crossing(drive, lead, command, time_step)
         wave = _cosine(drive, shaft + turn) - _cosine(drive, shaft)
         speeds.append(((1 + drive.constant) * turn - drive.amplitude / drive.cycles * wave) / time_step)
-    return SymbolicVectorSystem(input=[*shafts, *leads, *commands], output=speeds)
+    return symbolic_block(input=[*shafts, *leads, *commands], output=speeds)
 
 
-def _encoder(drives: Sequence[WheelDrive], time_step: float) -> SymbolicVectorSystem:
+def _encoder(drives: Sequence[WheelDrive], time_step: float) -> System:
     """From [shaft angles; leads] to the measured speeds; its state is where the motors were."""
     before, shafts, leads = (_variables(name, len(drives)) for name in ("before", "shaft", "lead"))
     dynamics, output = [], []
@@ -105,7 +106,7 @@ def _encoder(drives: Sequence[WheelDrive], time_step: float) -> SymbolicVectorSy
         now = shaft + lead
         dynamics.append(now)
         output.append((_counted(drive, now) - _counted(drive, last)) / time_step)
-    return SymbolicVectorSystem(
+    return symbolic_block(
         state=before, input=[*shafts, *leads], dynamics=dynamics, output=output, time_period=time_step
     )
 

@@ -11,6 +11,7 @@ from pydrake.systems.primitives import MatrixGain, SymbolicVectorSystem
 from rollerbench.description import FixedWheel
 from rollerbench.errors import KinematicsError
 from rollerbench.kinematics import WheelKinematics
+from rollerbench.kinematics.wheels import held_kinematics
 from rollerbench.systems.kinematics import AnyRobot, _se2_integrator
 
 
@@ -90,18 +91,13 @@ class KinematicBase(Diagram):
 
 def _twist_matrix(robot: AnyRobot, command: str) -> NDArray[np.float64]:
     """M (3, n_inputs) of `KinematicBase`."""
-    kinematics = robot if isinstance(robot, WheelKinematics) else WheelKinematics(robot)
     if command == "v_xyw_B":
+        kinematics = robot if isinstance(robot, WheelKinematics) else WheelKinematics(robot)
         tyres = [i for i, wheel in enumerate(kinematics.robot.wheels) if isinstance(wheel, FixedWheel)]
         return kinematics.project(np.eye(3), tyres).T
     if command != "wheel_speeds":
         raise KinematicsError(f"command = {command!r}: accepted: 'wheel_speeds', 'v_xyw_B'")
-    if kinematics is not robot and kinematics.robot.steered_wheels:
-        raise KinematicsError(
-            f"{kinematics.robot.name} steers wheels, and its wheel speeds mean nothing without their angles; accepted: "
-            "command='v_xyw_B', or its WheelKinematics at the swivel_angles at which they are held"
-        )
-    return kinematics.forward_matrix
+    return held_kinematics(robot).forward_matrix
 
 
 def _rate_integrator() -> SymbolicVectorSystem:

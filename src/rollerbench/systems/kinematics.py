@@ -1,7 +1,7 @@
 """The wheels' kinematics as Drake Systems.
 
-Each is a Diagram of Drake's own C++ systems behind named ports: as fast as C++, and convertible to AutoDiffXd and
-Expression with ToAutoDiffXd() and ToSymbolic().
+Each is a Diagram of Drake's gains and of formulas that Drake evaluates (`symbolic_block`), behind named ports;
+convertible to AutoDiffXd and Expression with ToAutoDiffXd() and ToSymbolic().
 """
 
 from collections.abc import Mapping
@@ -13,12 +13,14 @@ from numpy.typing import ArrayLike, NDArray
 from pydrake import symbolic
 from pydrake.symbolic import Expression, Variable, atan2, cos, sin, sqrt
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder, System
-from pydrake.systems.primitives import MatrixGain, Multiplexer, SymbolicVectorSystem
+from pydrake.systems.primitives import MatrixGain, Multiplexer
 
 from rollerbench.description import Robot
 from rollerbench.errors import KinematicsError
 from rollerbench.kinematics import WheelKinematics
 from rollerbench.kinematics.uncertainty import UPPER, OdometryNoise, StepTerms, checked_covariance, spread, step_terms
+from rollerbench.kinematics.wheels import held_kinematics
+from rollerbench.systems.symbolic_block import symbolic_block
 
 AnyRobot = Robot | WheelKinematics | str | Path | Mapping[str, Any]
 
@@ -32,6 +34,7 @@ class InverseKinematics(Diagram):
         wheel_speeds (n_driven): in the order of robot.yaml [rad/s].
 
     Twists at which a tyre would skid are not refused here (a System cannot): see `WheelKinematics.require_feasible`.
+    Steered wheels are those of the angles of the WheelKinematics, 0 by default; `SteeringKinematics` turns them.
     """
 
     def __init__(self, robot: AnyRobot) -> None:
@@ -50,7 +53,7 @@ class ForwardKinematics(Diagram):
 
     def __init__(self, robot: AnyRobot) -> None:
         super().__init__()
-        _wrap_gain(self, _kinematics(robot).forward_matrix, "wheel_speeds", "v_xyw_B")
+        _wrap_gain(self, held_kinematics(robot).forward_matrix, "wheel_speeds", "v_xyw_B")
 
 
 class Odometry(Diagram):
@@ -82,7 +85,7 @@ class Odometry(Diagram):
         super().__init__()
         if not (np.isfinite(time_step) and time_step > 0):
             raise KinematicsError(f"time_step = {time_step}: accepted: a positive number of seconds")
-        kinematics = _kinematics(robot)
+        kinematics = held_kinematics(robot)
         builder = DiagramBuilder()
         twist = builder.AddNamedSystem("forward_kinematics", MatrixGain(kinematics.forward_matrix))
         pose = builder.AddNamedSystem(self._INTEGRATOR, _se2_integrator(time_step))
@@ -135,7 +138,7 @@ class PlanarState(Diagram):
         }
         first = None
         for name, expressions in outputs.items():
-            system = builder.AddNamedSystem(name, SymbolicVectorSystem(input=state, output=expressions))
+            system = builder.AddNamedSystem(name, symbolic_block(input=state, output=expressions))
             if first is None:
                 first = builder.ExportInput(system.get_input_port(), "state")
             else:
@@ -156,7 +159,7 @@ def _wrap_gain(diagram: Diagram, matrix: NDArray[np.float64], input_name: str, o
     builder.BuildInto(diagram)
 
 
-def _se2_integrator(time_step: float) -> SymbolicVectorSystem:
+def _se2_integrator(time_step: float) -> System:
     x, y, yaw = pose = [Variable(name) for name in ("x", "y", "yaw")]
     vx, vy, wz = twist = [Variable(name) for name in ("vx", "vy", "wz")]
     # sin(half)/half without a branch: the tiny summand keeps it exact to the last bit, at half = 0 too.
@@ -164,7 +167,7 @@ def _se2_integrator(time_step: float) -> SymbolicVectorSystem:
     away = sqrt(half * half + 1e-24)
     chord = time_step * sin(away) / away
     heading = yaw + half
-    return SymbolicVectorSystem(
+    return symbolic_block(
         state=pose,
         input=twist,
         dynamics=[
@@ -185,7 +188,7 @@ def _step_covariance(kinematics: WheelKinematics, noise: OdometryNoise, time_ste
     variances = [time_step * (slope * sqrt(speed * speed + 1e-24) + rest) for slope, rest, speed in coefficients]
     forward = kinematics.forward_matrix
     builder = DiagramBuilder()
-    angles = builder.AddNamedSystem("angle_variances", SymbolicVectorSystem(input=speeds, output=variances))
+    angles = builder.AddNamedSystem("angle_variances", symbolic_block(input=speeds, output=variances))
     gain = builder.AddNamedSystem("gain", MatrixGain(forward[UPPER[0]] * forward[UPPER[1]]))
     builder.Connect(angles.get_output_port(), gain.get_input_port())
     builder.ExportInput(angles.get_input_port(), "wheel_speeds")
@@ -193,21 +196,21 @@ def _step_covariance(kinematics: WheelKinematics, noise: OdometryNoise, time_ste
     return builder.Build()
 
 
-def _step_terms(time_step: float) -> SymbolicVectorSystem:
+def _step_terms(time_step: float) -> System:
     """From [pose; twist] to the `StepTerms`."""
     pose = [Variable(name) for name in ("x", "y", "yaw")]
     twist = [Variable(name) for name in ("vx", "vy", "wz")]
     terms = step_terms(pose[2], [time_step * rate for rate in twist], symbolic)
-    return SymbolicVectorSystem(input=[*pose, *twist], output=list(terms))
+    return symbolic_block(input=[*pose, *twist], output=list(terms))
 
 
-def _se2_covariance(time_step: float) -> SymbolicVectorSystem:
+def _se2_covariance(time_step: float) -> System:
     """From [step terms; covariance of the step] to the covariance of the pose."""
     xx, xy, xt, yy, yt, tt = state = [Variable(name) for name in ("xx", "xy", "xt", "yy", "yt", "tt")]
     terms = [Variable(name) for name in StepTerms._fields]
     xx_q, xy_q, xt_q, yy_q, yt_q, tt_q = added = [Variable(f"{entry}_step") for entry in state]
     dynamics = spread((xx, xy, xt, yy, yt, tt), StepTerms(*terms), (xx_q, xy_q, xt_q, yy_q, yt_q, tt_q))
-    return SymbolicVectorSystem(
+    return symbolic_block(
         state=state,
         input=[*terms, *added],
         dynamics=list(dynamics),

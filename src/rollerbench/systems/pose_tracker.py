@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 from pydrake.symbolic import Expression, Variable, cos, sin
-from pydrake.systems.framework import Diagram, DiagramBuilder
-from pydrake.systems.primitives import Demultiplexer, Multiplexer, SymbolicVectorSystem, TrajectorySource
+from pydrake.systems.framework import Diagram, DiagramBuilder, System
+from pydrake.systems.primitives import Demultiplexer, Multiplexer, TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial, Trajectory
 
 from rollerbench.description import Robot
@@ -17,6 +17,7 @@ from rollerbench.errors import KinematicsError
 from rollerbench.kinematics import WheelKinematics, odometry
 from rollerbench.kinematics.profile import Profile, reference_poses
 from rollerbench.kinematics.tracking import DEFAULT_GAINS, TrackingGains, tracking_law
+from rollerbench.systems.symbolic_block import symbolic_block
 
 SAMPLE_TIME = 0.01
 """Largest spacing of the samples between which reference poses are cubics [s]."""
@@ -100,7 +101,7 @@ class PoseTracker(Diagram):
             twist = law(*(np.array([Expression(each) for each in vector]) for vector in variables))
         builder = DiagramBuilder()
         inputs = builder.AddNamedSystem("inputs", Multiplexer([3, 3, 3]))
-        system = SymbolicVectorSystem(input=[each for vector in variables for each in vector], output=list(twist))
+        system = symbolic_block(input=[each for vector in variables for each in vector], output=list(twist))
         builder.AddNamedSystem("law", system)
         builder.Connect(inputs.get_output_port(), system.get_input_port())
         for index, name in enumerate(names):
@@ -130,12 +131,12 @@ def _twist_source(twist: Profile, start: ArrayLike) -> TrajectorySource:
     return TrajectorySource(trajectory, zero_derivatives_beyond_limits=True)
 
 
-def _into_the_body() -> SymbolicVectorSystem:
+def _into_the_body() -> System:
     """From [q_xyt; its rates in W] to [q_xyt; v_xyw_B]."""
     q = [Variable(name) for name in ("x", "y", "yaw")]
     vx, vy, w = (Variable(name) for name in ("vx", "vy", "w"))
     c, s = cos(q[2]), sin(q[2])
-    return SymbolicVectorSystem(
+    return symbolic_block(
         input=[*q, vx, vy, w],
         output=[*map(Expression, q), c * vx + s * vy, c * vy - s * vx, Expression(w)],
     )

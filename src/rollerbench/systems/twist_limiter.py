@@ -14,13 +14,13 @@ from pydrake.systems.primitives import (
     Demultiplexer,
     LinearSystem,
     Multiplexer,
-    SymbolicVectorSystem,
 )
 
 from rollerbench.errors import KinematicsError
 from rollerbench.kinematics.limits.result import finite
 from rollerbench.kinematics.twist_limits import PerWheel, TwistLimits, twist_limits
 from rollerbench.systems.kinematics import AnyRobot, _kinematics
+from rollerbench.systems.symbolic_block import symbolic_block
 
 Array = NDArray[np.float64]
 Symbols: TypeAlias = Sequence[Variable | Expression]
@@ -172,13 +172,13 @@ def _append(builder: DiagramBuilder, output: OutputPort, name: str, system: Syst
     return system.get_output_port()
 
 
-def _moved(reference: Array) -> SymbolicVectorSystem:
+def _moved(reference: Array) -> System:
     """From [twist of C; p_BoCo_B] to the twist of the reference point."""
     twist, center = _variables("twist", 3), _variables("center", 2)
-    return SymbolicVectorSystem(input=[*twist, *center], output=_at(reference, twist, center))
+    return symbolic_block(input=[*twist, *center], output=_at(reference, twist, center))
 
 
-def _displacement(limits: TwistLimits, reference: Array, time_step: float) -> list[SymbolicVectorSystem]:
+def _displacement(limits: TwistLimits, reference: Array, time_step: float) -> list[System]:
     """From [displacement of C over the time step; p_BoCo_B] to the twist of the reference point, in a chain.
 
     The load is max_i |A_i v(k)| / speed_i, and 1 at the k looked for. As load / k changes with the turn only, k / load
@@ -195,29 +195,29 @@ def _displacement(limits: TwistLimits, reference: Array, time_step: float) -> li
     last = scale / _largest(maps, twist, 1.0)
     fixed = [*rate, *center]
     return [
-        SymbolicVectorSystem(input=fixed, output=_expressions([*fixed, 1 / sqrt(straight)])),
+        symbolic_block(input=fixed, output=_expressions([*fixed, 1 / sqrt(straight)])),
         *(
-            SymbolicVectorSystem(input=[*fixed, scale], output=_expressions([*fixed, expression]))
+            symbolic_block(input=[*fixed, scale], output=_expressions([*fixed, expression]))
             for expression in [better] * REFINEMENTS + [last]
         ),
-        SymbolicVectorSystem(input=[*fixed, scale], output=twist),
+        symbolic_block(input=[*fixed, scale], output=twist),
     ]
 
 
-def _speed(limits: TwistLimits) -> SymbolicVectorSystem:
+def _speed(limits: TwistLimits) -> System:
     twist = _variables("twist", 3)
     factor = sqrt(_largest(_finite_maps(limits.maps, limits.speeds), twist, 1.0))
-    return SymbolicVectorSystem(input=twist, output=[component / factor for component in twist])
+    return symbolic_block(input=twist, output=[component / factor for component in twist])
 
 
-def _held(limits: TwistLimits, time_step: float) -> SymbolicVectorSystem:
+def _held(limits: TwistLimits, time_step: float) -> System:
     """The state w, which approaches the target."""
     held, target = _variables("held", 3), _variables("target", 3)
     maps = _finite_maps(limits.maps, limits.speed_changes)
     changes = [there - here for here, there in zip(held, target, strict=True)]
     factor = sqrt(_largest(maps, changes, 1.0))
     nearer = [here + change / factor for here, change in zip(held, changes, strict=True)]
-    return SymbolicVectorSystem(
+    return symbolic_block(
         state=held,
         input=target,
         dynamics=nearer if len(maps) else _expressions(target),

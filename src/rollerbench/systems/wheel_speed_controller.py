@@ -8,12 +8,13 @@ from typing import Any
 
 from pydrake import symbolic
 from pydrake.symbolic import Expression, Variable
-from pydrake.systems.framework import Diagram, DiagramBuilder
-from pydrake.systems.primitives import Multiplexer, SymbolicVectorSystem
+from pydrake.systems.framework import Diagram, DiagramBuilder, System
+from pydrake.systems.primitives import Multiplexer
 
 from rollerbench.description import Robot, load_robot
 from rollerbench.description.mass import axle_inertia
 from rollerbench.errors import KinematicsError
+from rollerbench.systems.symbolic_block import symbolic_block
 
 LAG = 0.02
 """Time constant of the default gains [s], on robots whose wheels are not too light for it."""
@@ -118,7 +119,7 @@ class WheelSpeedController(Diagram):
         builder.BuildInto(self)
 
 
-def _pid(gains: Sequence[PidGains], limits: Sequence[float | None], time_step: float) -> SymbolicVectorSystem:
+def _pid(gains: Sequence[PidGains], limits: Sequence[float | None], time_step: float) -> System:
     """From [commands; speeds] to torques; its state is [integrals; speeds before]."""
     n = len(gains)
     commands, speeds, integrals, before = (
@@ -134,7 +135,7 @@ def _pid(gains: Sequence[PidGains], limits: Sequence[float | None], time_step: f
         torques.append(torque)
         back = min(1.0, time_step * gain.ki / gain.kp) if gain.kp else 0.0
         steps.append(integral + time_step * gain.ki * error + back * (torque - wanted))
-    return SymbolicVectorSystem(
+    return symbolic_block(
         state=[*integrals, *before],
         input=[*commands, *speeds],
         dynamics=[*steps, *(Expression(speed) for speed in speeds)],
