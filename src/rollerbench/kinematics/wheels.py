@@ -201,7 +201,7 @@ class WheelKinematics:
         skids = ", ".join(f"{name} at {speed:+.4g} m/s" for name, speed in zip(names, speeds, strict=True))
         raise InfeasibleTwist(
             f"{self.robot.name} cannot move at v_xyw_B = [{twist}]: its tyres would skid sideways ({skids}); "
-            f"accepted: twists with C @ v_xyw_B = 0, that is combinations of {self._feasible_text()}",
+            f"accepted: twists with C @ v_xyw_B = 0, that is combinations of {self._feasible_text(tyres)}",
             tuple(names),
             tuple(float(speed) for speed in speeds),
         )
@@ -352,11 +352,11 @@ class WheelKinematics:
     def _swivel_by_name(self) -> dict[str, float]:
         return {w.name: float(a) for w, a in zip(self.robot.wheels, self.swivel_angles, strict=True) if w.swivels}
 
-    def _feasible_text(self) -> str:
-        basis = null_space(self.constraint_matrix / self._scale) / self._scale[:, np.newaxis]
+    def _feasible_text(self, tyres: Sequence[int]) -> str:
+        basis = null_space(self._rows[1][tyres] / self._scale) / self._scale[:, np.newaxis]
         if not basis.size:
-            return "none: its tyres allow no motion at all"
-        columns = [column / np.abs(column).max() for column in basis.T]
+            return "none: these tyres allow no motion as they look now"
+        columns = [np.round(column / np.abs(column).max(), 12) for column in basis.T]
         return " and ".join("[" + ", ".join(f"{x:.3g}" for x in column + 0.0) + "]" for column in columns)
 
 

@@ -1,5 +1,6 @@
 """Drake Systems of rollerbench: thin shells over kinematics, with named ports."""
 
+from rollerbench.kinematics.tracking import TrackingGains
 from rollerbench.systems.contacts import RollResistance, SlipMonitor
 from rollerbench.systems.drivetrain import Drivetrain
 from rollerbench.systems.kinematic_base import KinematicBase
@@ -38,6 +39,7 @@ __all__ = [
     "StanceOdometry",
     "SteeredOdometry",
     "SteeringKinematics",
+    "TrackingGains",
     "TwistLimiter",
     "WheelSpeedController",
     "damp_joints",

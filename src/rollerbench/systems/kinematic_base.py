@@ -12,7 +12,7 @@ from rollerbench.description import FixedWheel
 from rollerbench.errors import KinematicsError
 from rollerbench.kinematics import WheelKinematics
 from rollerbench.kinematics.wheels import held_kinematics
-from rollerbench.systems.kinematics import AnyRobot, _se2_integrator
+from rollerbench.systems.kinematics import AnyRobot, _se2_integrator, checked_pose
 
 
 class KinematicBase(Diagram):
@@ -79,9 +79,7 @@ class KinematicBase(Diagram):
         Raises:
             KinematicsError: q_xyt is not finite or not of shape (3,).
         """
-        pose = np.asarray(q_xyt, dtype=np.float64)
-        if pose.shape != (3,) or not np.isfinite(pose).all():
-            raise KinematicsError(f"q_xyt = {q_xyt!r}: accepted: three finite numbers [x, y, yaw]")
+        pose = checked_pose(q_xyt)
         mine = self.GetMutableSubsystemContext(self.GetSubsystemByName(self._INTEGRATOR), context)
         if mine.has_only_continuous_state():
             mine.SetContinuousState(pose)

@@ -103,9 +103,13 @@ class Odometry(Diagram):
         builder.BuildInto(self)
 
     def set_pose(self, context: Context, q_xyt: ArrayLike, covariance: ArrayLike | None = None) -> None:
-        """Sets the pose (3,), and its covariance (3, 3) if there is one, in a context of this system."""
+        """Sets the pose (3,), and its covariance (3, 3) if there is one, in a context of this system.
+
+        Raises:
+            KinematicsError: q_xyt is not finite or not of shape (3,), or the covariance does not fit.
+        """
         integrator = self.GetSubsystemByName(self._INTEGRATOR)
-        self.GetMutableSubsystemContext(integrator, context).SetDiscreteState(np.asarray(q_xyt, np.float64))
+        self.GetMutableSubsystemContext(integrator, context).SetDiscreteState(checked_pose(q_xyt))
         if covariance is not None:
             if not self.HasSubsystemNamed(self._COVARIANCE):
                 raise KinematicsError("covariance: this Odometry was made without a noise; accepted: None")
@@ -145,6 +149,18 @@ class PlanarState(Diagram):
                 builder.ConnectInput(first, system.get_input_port())
             builder.ExportOutput(system.get_output_port(), name)
         builder.BuildInto(self)
+
+
+def checked_pose(q_xyt: ArrayLike) -> NDArray[np.float64]:
+    """A pose (3,).
+
+    Raises:
+        KinematicsError: it is not finite or not of that shape.
+    """
+    pose = np.asarray(q_xyt, dtype=np.float64)
+    if pose.shape != (3,) or not np.isfinite(pose).all():
+        raise KinematicsError(f"q_xyt = {q_xyt!r}: accepted: three finite numbers [x, y, yaw]")
+    return pose
 
 
 def _kinematics(robot: AnyRobot) -> WheelKinematics:
