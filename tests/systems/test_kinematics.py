@@ -108,3 +108,22 @@ def test_planar_state_of_a_tilted_body() -> None:
     system.GetInputPort("state").FixValue(context, [*quaternion, 1.0, 2.0, 0.3, 0.0, 0.0, 0.9, *velocity_W])
     assert system.GetOutputPort("q_xyt").Eval(context) == pytest.approx([1.0, 2.0, yaw], abs=1e-12)
     assert system.GetOutputPort("v_xyw_B").Eval(context) == pytest.approx([*velocity_B, 0.9], abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: rb.systems.Odometry("swerve_base", 0.01),
+        lambda: rb.systems.ForwardKinematics("swerve_base"),
+        lambda: rb.estimation.PoseFilter(
+            "swerve_base",
+            0.01,
+            wheels=rb.uncertainty.OdometryNoise(travel=1e-4),
+            gyro=rb.uncertainty.GyroNoise(density=1e-3),
+            fix_deviation=[0.1, 0.1, 0.1],
+        ),
+    ],
+)
+def test_wheel_speeds_alone_are_refused_where_wheels_steer(make) -> None:
+    with pytest.raises(rb.KinematicsError, match="swerve_base steers wheels"):
+        make()
