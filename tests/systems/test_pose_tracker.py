@@ -97,6 +97,18 @@ def test_steered_wheels_turn_no_faster_than_they_may_and_drive_less_meanwhile() 
     assert_allclose(kinematics.forward_at(step.wheel_speeds, angles), twist, atol=1e-12)
 
 
+def test_steered_wheels_keep_their_angles_where_next_to_no_speed_is_asked() -> None:
+    kinematics = rb.WheelKinematics("swerve_base")
+    angles = np.array([0.3, -0.2, 0.0, 1.0])
+    step = steering_step(kinematics, np.array([0.0, 0.0009, 0.0]), angles, 0.01)
+    assert_allclose(step.angles, angles, atol=0)
+    assert_allclose(step.rates, 0.0, atol=0)
+    radii = [wheel.radius for wheel in kinematics.robot.steered_wheels]
+    assert_allclose(step.wheel_speeds * radii, 0.0009 * np.sin(angles), atol=1e-12)
+    faster = steering_step(kinematics, np.array([0.0, 0.0011, 0.0]), angles, 1.0)
+    assert_allclose(np.abs(faster.angles), np.pi / 2, atol=1e-12)
+
+
 def test_steered_odometry_goes_where_the_steered_wheels_lead() -> None:
     kinematics = rb.WheelKinematics("swerve_base")
     twist = np.array([0.3, 0.2, 0.5])
