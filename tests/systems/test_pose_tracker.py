@@ -80,6 +80,17 @@ def test_the_tracker_is_the_law_for_every_scalar_type(robot: str) -> None:
     assert system.ToSymbolic().ToScalarType[float]().num_input_ports() == 3
 
 
+@pytest.mark.parametrize("robot", ["youbot_base", "differential_cart"])
+def test_the_tracker_has_derivatives_at_rest_and_without_error(robot: str) -> None:
+    derived = PoseTracker(robot).ToScalarType[AutoDiffXd]()
+    names = ("q_xyt", "reference_q_xyt", "reference_v_xyw_B")
+    seeds = {n: [AutoDiffXd(0.0, np.eye(9)[3 * k + i]) for i in range(3)] for k, n in enumerate(names)}
+    gradient = np.array([each.derivatives() for each in outputs(derived, seeds)["v_xyw_B"]])
+    gains, sideways = DEFAULT_GAINS, robot == "youbot_base"
+    feedback = np.diag([gains.position, gains.position * sideways, gains.heading])
+    assert_allclose(gradient, np.hstack([-feedback, feedback, np.diag([1.0, sideways, 1.0])]), atol=1e-9)
+
+
 def test_steered_wheels_turn_no_faster_than_they_may_and_drive_less_meanwhile() -> None:
     data = robots.swerve()
     for wheel in data["wheels"]:

@@ -37,7 +37,7 @@ Vector = NDArray[Any]
 """Numbers, or objects that numpy computes with, such as Drake's Expressions."""
 
 TINY = 1e-24
-"""Keeps the argument of sin(x)/x from 0, without an effect on its value."""
+"""Keeps square roots from 0, where they have no derivative, without an effect on sin(x)/x or |x|."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -134,10 +134,10 @@ def _on_an_axle(
     along = np.array([math.cos(heading), math.sin(heading)])
     vx, vy, w = v_xyw_B
     speed = along[0] * (vx - w * y) + along[1] * (vy + w * x)
-    some = np.sqrt(turn * turn + TINY)
+    some, pace = np.sqrt(turn * turn + TINY), np.sqrt(speed * speed + TINY)
     v = speed * np.cos(turn) + gains.position * ahead
     back = gains.lateral**2 * speed * (np.sin(some) / some) * left
-    w = w + back + (gains.heading + math.sqrt(2) * gains.lateral * np.abs(speed)) * turn
+    w = w + back + (gains.heading + math.sqrt(2) * gains.lateral * pace) * turn
     return np.array([v * along[0] + w * y, v * along[1] - w * x, w])
 
 
