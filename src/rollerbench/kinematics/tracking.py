@@ -75,7 +75,7 @@ def tracking_law(
     """The law for a robot: a function of its pose, the reference's pose and twist, (3,) each, to the twist of Bo (3,).
 
     Raises:
-        KinematicsError: the robot's tyres allow no motion.
+        KinematicsError: the robot's tyres allow no motion, or the kinematics' twists are not those of Bo.
     """
     free = _free_twists(kinematics)
     if free.shape[1] == 0:
@@ -94,10 +94,10 @@ def axle(kinematics: WheelKinematics) -> tuple[Array, float]:
     """The point (2,) nearest to Bo of the axle on which all fixed tyres sit [m], and their heading [rad], in B.
 
     Raises:
-        KinematicsError: there is no such axle.
+        KinematicsError: there is no such axle, or the kinematics' twists are not those of Bo.
     """
     rows = speed_rows(kinematics.robot).tyre_rows
-    if not len(rows) or _free_twists(kinematics).shape[1] != 2:
+    if _free_twists(kinematics).shape[1] != 2:
         raise KinematicsError(f"{kinematics.robot.name} has no single axle with fixed tyres")
     left, offset = rows[0, :2], rows[0, 2]
     along = np.array([left[1], -left[0]])
@@ -149,6 +149,10 @@ def _moved(q_xyt: Vector, place: Array, heading: float) -> Vector:
 
 
 def _free_twists(kinematics: WheelKinematics) -> Array:
-    """Basis (3, k) of the twists at which no fixed tyre skids, yaw rates times a length."""
+    """Basis (3, k) of the twists of Bo at which no fixed tyre skids, yaw rates times a length."""
+    if kinematics.p_BoCo_B.any():
+        raise KinematicsError(
+            f"p_BoCo_B = {kinematics.p_BoCo_B.tolist()}: poses are tracked by twists of Bo; accepted: [0, 0]"
+        )
     rows = speed_rows(kinematics.robot)
     return null_space(rows.tyre_rows / [1.0, 1.0, rows.length])
