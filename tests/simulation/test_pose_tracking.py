@@ -78,6 +78,17 @@ def test_every_wheeled_robot_tracks(robot: str) -> None:
     assert result.summary["status"] == "ok"
 
 
+@pytest.mark.parametrize(
+    ("robot", "changes"),
+    # Half of a period, and with steering one more; the mean that limits the jerk takes 20 twists.
+    [("swerve_base", {"period": 0.05}), ("kiwi", {"max_wheel_acceleration": 60.0, "max_wheel_jerk": 600.0})],
+)
+def test_the_feedforward_is_ahead_by_what_the_loop_is_late(robot: str, changes: dict) -> None:
+    distance, _, _ = errors(robot, {}, {**TRACKING, **changes}, {**TURN, "ramp": 0.5}, 1.2)
+    # Late, they would be 9 and 13 mm off.
+    assert distance < 0.004
+
+
 def test_a_car_tracks_with_its_steering() -> None:
     car = robots.car()
     distance, _, _ = errors(
