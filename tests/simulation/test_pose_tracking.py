@@ -81,11 +81,11 @@ def test_every_wheeled_robot_tracks(robot: str) -> None:
 @pytest.mark.parametrize(
     ("robot", "changes"),
     # Half of a period, and with steering one more; the mean that limits the jerk takes 20 twists.
-    [("swerve_base", {"period": 0.05}), ("kiwi", {"max_wheel_acceleration": 60.0, "max_wheel_jerk": 600.0})],
+    [(robots.car(), {"period": 0.05}), ("kiwi", {"max_wheel_acceleration": 60.0, "max_wheel_jerk": 600.0})],
 )
-def test_the_feedforward_is_ahead_by_what_the_loop_is_late(robot: str, changes: dict) -> None:
+def test_the_feedforward_is_ahead_by_what_the_loop_is_late(robot: str | dict, changes: dict) -> None:
     distance, _, _ = errors(robot, {}, {**TRACKING, **changes}, {**TURN, "ramp": 0.5}, 1.2)
-    # Late, they would be 9 and 13 mm off.
+    # Late, they would be 10 and 19 mm off.
     assert distance < 0.004
 
 
@@ -136,6 +136,9 @@ def test_a_controller_without_a_type_is_the_one_that_has_its_fields() -> None:
         ({}, "open_loop"),
         ({"servo": "pid"}, "open_loop"),
         ({"position": 2.0}, "pose_tracking"),
+        ({"period": 0.02}, "pose_tracking"),
         ({"servo": "pid", "lateral": 2.0}, "pose_tracking"),
     ):
         assert rb.load_scenario({**data, "controller": controller}).controller.type == expected
+    legs = rb.load_scenario("hexapod_stand", overrides={"controller": {"period": 0.01}})
+    assert legs.controller.type == "legs"
