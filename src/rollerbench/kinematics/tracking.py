@@ -69,6 +69,15 @@ class TrackingGains:
 DEFAULT_GAINS = TrackingGains()
 
 
+def on_an_axle(kinematics: WheelKinematics) -> bool:
+    """Whether the law is the one for tyres on one axle.
+
+    Raises:
+        KinematicsError: the kinematics' twists are not those of Bo.
+    """
+    return _free_twists(kinematics).shape[1] == 2
+
+
 def tracking_law(
     kinematics: WheelKinematics, gains: TrackingGains = DEFAULT_GAINS
 ) -> Callable[[Vector, Vector, Vector], Vector]:
@@ -80,7 +89,7 @@ def tracking_law(
     free = _free_twists(kinematics)
     if free.shape[1] == 0:
         raise KinematicsError(f"{kinematics.robot.name}: its tyres allow no motion at all, so it cannot track a pose")
-    if free.shape[1] == 2:
+    if on_an_axle(kinematics):
         place, heading = axle(kinematics)
         return lambda q, reference, twist: _on_an_axle(gains, place, heading, q, reference, twist)
     scale = np.array([1.0, 1.0, speed_rows(kinematics.robot).length])
@@ -97,13 +106,25 @@ def axle(kinematics: WheelKinematics) -> tuple[Array, float]:
         KinematicsError: there is no such axle, or the kinematics' twists are not those of Bo.
     """
     rows = speed_rows(kinematics.robot).tyre_rows
-    if _free_twists(kinematics).shape[1] != 2:
+    if not on_an_axle(kinematics):
         raise KinematicsError(f"{kinematics.robot.name} has no single axle with fixed tyres")
     left, offset = rows[0, :2], rows[0, 2]
     along = np.array([left[1], -left[0]])
     if along[0] < 0 or (along[0] == 0 and along[1] < 0):
         along, offset = -along, -offset
     return offset * along, math.atan2(along[1], along[0])
+
+
+def axle_speed(kinematics: WheelKinematics, v_xyw_B: Array) -> Array:
+    """Speeds (...) along the tyres of the point `axle` at twists (..., 3) of Bo [m/s].
+
+    Raises:
+        KinematicsError: there is no such axle, or the kinematics' twists are not those of Bo.
+    """
+    (x, y), heading = axle(kinematics)
+    cos, sin = math.cos(heading), math.sin(heading)
+    speeds: Array = v_xyw_B @ np.array([cos, sin, sin * x - cos * y])
+    return speeds
 
 
 def pose_error(q_xyt: Vector, reference_q_xyt: Vector) -> Vector:
