@@ -98,3 +98,11 @@ def test_with_one_motion_left_the_way_along_it_is_tracked() -> None:
 def test_bad_gains_are_named(value: float) -> None:
     with pytest.raises(rb.KinematicsError, match="position"):
         TrackingGains(position=value)
+
+
+@pytest.mark.parametrize("robot", ["differential_cart", "kiwi"])
+def test_twists_of_another_point_are_refused(robot: str) -> None:
+    kinematics = rb.WheelKinematics(robot).at([0.1, 0.0])
+    for make in (tracking_law, axle):
+        with pytest.raises(rb.KinematicsError, match=r"p_BoCo_B = \[0.1, 0.0\]: .* accepted: \[0, 0\]"):
+            make(kinematics)

@@ -78,6 +78,17 @@ def test_every_wheeled_robot_tracks(robot: str) -> None:
     assert result.summary["status"] == "ok"
 
 
+@pytest.mark.parametrize(
+    ("robot", "changes"),
+    # Half of a period, and with steering one more; the mean that limits the jerk takes 20 twists.
+    [(robots.car(), {"period": 0.05}), ("kiwi", {"max_wheel_acceleration": 60.0, "max_wheel_jerk": 600.0})],
+)
+def test_the_feedforward_is_ahead_by_what_the_loop_is_late(robot: str | dict, changes: dict) -> None:
+    distance, _, _ = errors(robot, {}, {**TRACKING, **changes}, {**TURN, "ramp": 0.5}, 1.2)
+    # Late, they would be 10 and 19 mm off.
+    assert distance < 0.004
+
+
 def test_a_car_tracks_with_its_steering() -> None:
     car = robots.car()
     distance, _, _ = errors(
@@ -101,6 +112,17 @@ def test_wheels_stay_within_their_limits() -> None:
     assert np.abs(np.diff(periods, axis=0)).max() <= 5.0 * 0.01 * (1 + 1e-9)
 
 
+def stuck() -> dict:
+    """The cart with more tyres, of which no two look the same way."""
+    data = robots.cart()
+    wheel = {**data["wheels"][0], "driven": False}
+    more = [
+        {**wheel, "name": "ahead", "position": [0.3, 0.0], "heading_deg": 90.0},
+        {**wheel, "name": "behind", "position": [-0.3, 0.1], "heading_deg": 45.0},
+    ]
+    return {**data, "name": "stuck", "wheels": [*data["wheels"], *more]}
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
@@ -112,11 +134,36 @@ def test_wheels_stay_within_their_limits() -> None:
         ({"controller": TRACKING, "command": {"type": "wheel_efforts", "wheel_efforts": {}}}, "command.type"),
         ({"controller": TRACKING, "robot": "wheel_leg_hexapod"}, "controller.type"),
         ({"command": {**EIGHT, "name": "line", "length": 1.0}}, "a line does not close"),
+        (
+            {"controller": {**TRACKING, "max_wheel_acceleration": 20.0, "max_wheel_jerk": 100.0}},
+            "controller.max_wheel_jerk = 100.0: it takes a mean of 40 periods of control, by which the feedback would "
+            "be too late at gains of 4/s; accepted: 166.7 or more",
+        ),
+        (
+            {"controller": {**TRACKING, "max_wheel_acceleration": 20.0, "max_wheel_jerk": 1.0}},
+            "controller.max_wheel_jerk = 1.0: it takes a mean of more than 500 periods",
+        ),
+        (
+            {"controller": {**TRACKING, "lateral": 150.0}, "robot": "differential_cart"},
+            "lateral = 150.0: at 0.3 m/s the heading would follow at a rate of 67.64/s; accepted: up to 108.4,",
+        ),
+        ({"controller": TRACKING, "robot": stuck()}, "controller.type = 'pose_tracking': stuck: its tyres allow no"),
     ],
 )
 def test_what_cannot_be_tracked_is_refused(changes: dict, message: str) -> None:
     with pytest.raises(rb.DescriptionError, match=re.escape(message)):
         rb.load_scenario({"name": "x", "robot": "kiwi", "duration": 1.0, "command": TURN, **changes})
+
+
+def test_what_is_accepted_instead_is() -> None:
+    data = {"name": "x", "robot": "kiwi", "duration": 1.0, "command": TURN}
+    jerk = {"max_wheel_acceleration": 20.0, "max_wheel_jerk": 166.7}
+    assert rb.load_scenario({**data, "controller": {**TRACKING, **jerk}}).tracking is not None
+    for robot in ("differential_cart", "six_wheel"):
+        fastest = {**TURN, "v_xyw_B": [float(rb.limits.max_speed(robot, 0.0).value), 0.0, 0.0]}
+        assert rb.load_scenario({**data, "robot": robot, "command": fastest, "controller": TRACKING}).tracking
+    lateral = {**TRACKING, "lateral": 108.4}
+    assert rb.load_scenario({**data, "robot": "differential_cart", "controller": lateral}).tracking
 
 
 def test_a_controller_without_a_type_is_the_one_that_has_its_fields() -> None:
@@ -125,6 +172,9 @@ def test_a_controller_without_a_type_is_the_one_that_has_its_fields() -> None:
         ({}, "open_loop"),
         ({"servo": "pid"}, "open_loop"),
         ({"position": 2.0}, "pose_tracking"),
+        ({"period": 0.02}, "pose_tracking"),
         ({"servo": "pid", "lateral": 2.0}, "pose_tracking"),
     ):
         assert rb.load_scenario({**data, "controller": controller}).controller.type == expected
+    legs = rb.load_scenario("hexapod_stand", overrides={"controller": {"period": 0.01}})
+    assert legs.controller.type == "legs"

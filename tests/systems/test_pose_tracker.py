@@ -80,6 +80,17 @@ def test_the_tracker_is_the_law_for_every_scalar_type(robot: str) -> None:
     assert system.ToSymbolic().ToScalarType[float]().num_input_ports() == 3
 
 
+@pytest.mark.parametrize("robot", ["youbot_base", "differential_cart"])
+def test_the_tracker_has_derivatives_at_rest_and_without_error(robot: str) -> None:
+    derived = PoseTracker(robot).ToScalarType[AutoDiffXd]()
+    names = ("q_xyt", "reference_q_xyt", "reference_v_xyw_B")
+    seeds = {n: [AutoDiffXd(0.0, np.eye(9)[3 * k + i]) for i in range(3)] for k, n in enumerate(names)}
+    gradient = np.array([each.derivatives() for each in outputs(derived, seeds)["v_xyw_B"]])
+    gains, sideways = DEFAULT_GAINS, robot == "youbot_base"
+    feedback = np.diag([gains.position, gains.position * sideways, gains.heading])
+    assert_allclose(gradient, np.hstack([-feedback, feedback, np.diag([1.0, sideways, 1.0])]), atol=1e-9)
+
+
 def test_steered_wheels_turn_no_faster_than_they_may_and_drive_less_meanwhile() -> None:
     data = robots.swerve()
     for wheel in data["wheels"]:
@@ -95,6 +106,18 @@ def test_steered_wheels_turn_no_faster_than_they_may_and_drive_less_meanwhile() 
         angles = step.angles
     assert_allclose(angles, wanted, atol=1e-12)
     assert_allclose(kinematics.forward_at(step.wheel_speeds, angles), twist, atol=1e-12)
+
+
+def test_steered_wheels_keep_their_angles_where_next_to_no_speed_is_asked() -> None:
+    kinematics = rb.WheelKinematics("swerve_base")
+    angles = np.array([0.3, -0.2, 0.0, 1.0])
+    step = steering_step(kinematics, np.array([0.0, 0.0009, 0.0]), angles, 0.01)
+    assert_allclose(step.angles, angles, atol=0)
+    assert_allclose(step.rates, 0.0, atol=0)
+    radii = [wheel.radius for wheel in kinematics.robot.steered_wheels]
+    assert_allclose(step.wheel_speeds * radii, 0.0009 * np.sin(angles), atol=1e-12)
+    faster = steering_step(kinematics, np.array([0.0, 0.0011, 0.0]), angles, 1.0)
+    assert_allclose(np.abs(faster.angles), np.pi / 2, atol=1e-12)
 
 
 def test_steered_odometry_goes_where_the_steered_wheels_lead() -> None:

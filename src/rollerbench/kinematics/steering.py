@@ -9,6 +9,9 @@ from rollerbench.kinematics.wheels import WheelKinematics
 
 Array = NDArray[np.float64]
 
+STANDSTILL = 1e-3
+"""Speed of its centre below which a wheel does not steer [m/s]: what feedback still asks for near rest."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SteeringStep:
@@ -30,11 +33,14 @@ def steering_step(kinematics: WheelKinematics, v_xyw_B: Array, angles: Array, pe
 
     A wheel turns the shorter way, backwards if that is shorter, no faster than its max_steering_speed; until it looks
     where it has to go it turns only as fast as its way along its own heading, |cos| of the angle that is missing.
+    Slower than `STANDSTILL` it keeps its angle: the direction of next to no speed is noise.
     """
     robot = kinematics.robot
     wanted, steered = kinematics.steering(v_xyw_B, previous=angles)
     limits = np.array([getattr(wheel, "max_steering_speed", None) or np.inf for wheel in robot.steered_wheels])
-    turn = np.clip(wanted - angles, -limits * period, limits * period)
+    radii = np.array([wheel.radius for wheel in robot.steered_wheels])
+    moves = np.abs(steered) * radii >= STANDSTILL
+    turn = np.where(moves, np.clip(wanted - angles, -limits * period, limits * period), 0.0)
     missing = wanted - angles - turn
     speeds = kinematics.drive_matrix @ v_xyw_B
     for column, wheel in enumerate(robot.driven_wheels):

@@ -37,7 +37,7 @@ Vector = NDArray[Any]
 """Numbers, or objects that numpy computes with, such as Drake's Expressions."""
 
 TINY = 1e-24
-"""Keeps the argument of sin(x)/x from 0, without an effect on its value."""
+"""Keeps square roots from 0, where they have no derivative, without an effect on sin(x)/x or |x|."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,18 +69,27 @@ class TrackingGains:
 DEFAULT_GAINS = TrackingGains()
 
 
+def on_an_axle(kinematics: WheelKinematics) -> bool:
+    """Whether the law is the one for tyres on one axle.
+
+    Raises:
+        KinematicsError: the kinematics' twists are not those of Bo.
+    """
+    return _free_twists(kinematics).shape[1] == 2
+
+
 def tracking_law(
     kinematics: WheelKinematics, gains: TrackingGains = DEFAULT_GAINS
 ) -> Callable[[Vector, Vector, Vector], Vector]:
     """The law for a robot: a function of its pose, the reference's pose and twist, (3,) each, to the twist of Bo (3,).
 
     Raises:
-        KinematicsError: the robot's tyres allow no motion.
+        KinematicsError: the robot's tyres allow no motion, or the kinematics' twists are not those of Bo.
     """
     free = _free_twists(kinematics)
     if free.shape[1] == 0:
         raise KinematicsError(f"{kinematics.robot.name}: its tyres allow no motion at all, so it cannot track a pose")
-    if free.shape[1] == 2:
+    if on_an_axle(kinematics):
         place, heading = axle(kinematics)
         return lambda q, reference, twist: _on_an_axle(gains, place, heading, q, reference, twist)
     scale = np.array([1.0, 1.0, speed_rows(kinematics.robot).length])
@@ -94,16 +103,28 @@ def axle(kinematics: WheelKinematics) -> tuple[Array, float]:
     """The point (2,) nearest to Bo of the axle on which all fixed tyres sit [m], and their heading [rad], in B.
 
     Raises:
-        KinematicsError: there is no such axle.
+        KinematicsError: there is no such axle, or the kinematics' twists are not those of Bo.
     """
     rows = speed_rows(kinematics.robot).tyre_rows
-    if not len(rows) or _free_twists(kinematics).shape[1] != 2:
+    if not on_an_axle(kinematics):
         raise KinematicsError(f"{kinematics.robot.name} has no single axle with fixed tyres")
     left, offset = rows[0, :2], rows[0, 2]
     along = np.array([left[1], -left[0]])
     if along[0] < 0 or (along[0] == 0 and along[1] < 0):
         along, offset = -along, -offset
     return offset * along, math.atan2(along[1], along[0])
+
+
+def axle_speed(kinematics: WheelKinematics, v_xyw_B: Array) -> Array:
+    """Speeds (...) along the tyres of the point `axle` at twists (..., 3) of Bo [m/s].
+
+    Raises:
+        KinematicsError: there is no such axle, or the kinematics' twists are not those of Bo.
+    """
+    (x, y), heading = axle(kinematics)
+    cos, sin = math.cos(heading), math.sin(heading)
+    speeds: Array = v_xyw_B @ np.array([cos, sin, sin * x - cos * y])
+    return speeds
 
 
 def pose_error(q_xyt: Vector, reference_q_xyt: Vector) -> Vector:
@@ -134,10 +155,10 @@ def _on_an_axle(
     along = np.array([math.cos(heading), math.sin(heading)])
     vx, vy, w = v_xyw_B
     speed = along[0] * (vx - w * y) + along[1] * (vy + w * x)
-    some = np.sqrt(turn * turn + TINY)
+    some, pace = np.sqrt(turn * turn + TINY), np.sqrt(speed * speed + TINY)
     v = speed * np.cos(turn) + gains.position * ahead
     back = gains.lateral**2 * speed * (np.sin(some) / some) * left
-    w = w + back + (gains.heading + math.sqrt(2) * gains.lateral * np.abs(speed)) * turn
+    w = w + back + (gains.heading + math.sqrt(2) * gains.lateral * pace) * turn
     return np.array([v * along[0] + w * y, v * along[1] - w * x, w])
 
 
@@ -149,6 +170,10 @@ def _moved(q_xyt: Vector, place: Array, heading: float) -> Vector:
 
 
 def _free_twists(kinematics: WheelKinematics) -> Array:
-    """Basis (3, k) of the twists at which no fixed tyre skids, yaw rates times a length."""
+    """Basis (3, k) of the twists of Bo at which no fixed tyre skids, yaw rates times a length."""
+    if kinematics.p_BoCo_B.any():
+        raise KinematicsError(
+            f"p_BoCo_B = {kinematics.p_BoCo_B.tolist()}: poses are tracked by twists of Bo; accepted: [0, 0]"
+        )
     rows = speed_rows(kinematics.robot)
     return null_space(rows.tyre_rows / [1.0, 1.0, rows.length])

@@ -1,11 +1,16 @@
 """What of a scenario does not fit together."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from rollerbench.description.problems import Problem
-from rollerbench.errors import KinematicsError
+from rollerbench.errors import DescriptionError, KinematicsError
+from rollerbench.kinematics import WheelKinematics
+from rollerbench.kinematics.tracking import axle_speed, on_an_axle, tracking_law
+from rollerbench.kinematics.twist_limits import MAX_SAMPLES, twist_limits
 from rollerbench.simulation.commands import WheelEffortsCommand
 from rollerbench.simulation.leg_command import GaitCommand
 from rollerbench.simulation.settings import LegControl, OpenLoop, PoseTracking, WheelControl
@@ -14,8 +19,20 @@ if TYPE_CHECKING:
     from rollerbench.simulation.scenario import Scenario
 
 
+LARGEST_GAIN = 0.5
+"""Largest share of an error that feedback may take away in the time by which it is late; loops swing from 1.2 on."""
+
+
 def scenario_problems(scenario: "Scenario") -> Iterator[Problem]:
     """All problems of a scenario whose sections are valid each by itself."""
+    found = list(_problems(scenario))
+    yield from found
+    # Speeds and limits mean something only if all else fits.
+    if not found and scenario.tracking is not None:
+        yield from _loop_problems(scenario, scenario.tracking)
+
+
+def _problems(scenario: "Scenario") -> Iterator[Problem]:
     command, control = scenario.command, scenario.wheel_control
     of_command = list(command.problems(scenario.robot, scenario.duration, scenario.plant.time_step))
     yield from of_command
@@ -75,6 +92,69 @@ def _tracking_problems(scenario: "Scenario", tracking: PoseTracking) -> Iterator
         yield Problem(
             ("controller", "max_wheel_jerk"), "accepted: with max_wheel_acceleration", tracking.max_wheel_jerk
         )
+
+
+def _loop_problems(scenario: "Scenario", tracking: PoseTracking) -> Iterator[Problem]:
+    """Whether the feedback is slow enough for the period, and for the mean that limits the jerk."""
+    kinematics = WheelKinematics(scenario.robot)
+    try:
+        tracking_law(kinematics)
+    except KinematicsError as error:
+        yield Problem(("controller", "type"), f"{error}; accepted: open_loop", tracking.type)
+        return
+    most, speed = LARGEST_GAIN / tracking.period, _axle_speed(scenario, kinematics)
+    turning = tracking.heading + math.sqrt(2) * speed * tracking.lateral
+    if turning > most * (1 + 1e-9):
+        accepted = _four_digits((most - tracking.heading) / (math.sqrt(2) * speed), math.floor)
+        message = (
+            f"at {speed:.4g} m/s the heading would follow at a rate of {turning:.4g}/s; "
+            f"accepted: up to {accepted}, or a shorter controller.period"
+        )
+        yield Problem(("controller", "lateral"), message, tracking.lateral)
+        return
+    yield from _jerk_problems(kinematics, tracking, max(tracking.position, turning))
+
+
+def _axle_speed(scenario: "Scenario", kinematics: WheelKinematics) -> float:
+    """Largest commanded speed of a robot with tyres on an axle, along them [m/s]; 0 for others."""
+    if not on_an_axle(kinematics):
+        return 0.0
+    try:
+        twist = scenario.motion.twist
+    except (KinematicsError, DescriptionError):
+        return 0.0  # Who asks for the motion hears why there is none.
+    return float(np.abs(axle_speed(kinematics, twist.values)).max())
+
+
+def _jerk_problems(kinematics: WheelKinematics, tracking: PoseTracking, gain: float) -> Iterator[Problem]:
+    """A mean of N twists is late by (N - 1) / 2 periods, on top of the one for which a twist is held."""
+    period, acceleration, jerk = tracking.period, tracking.max_wheel_acceleration, tracking.max_wheel_jerk
+    if acceleration is None or jerk is None:
+        return
+    longest = min(math.floor(2 * LARGEST_GAIN / max(gain * period, 1e-9) - 1 + 1e-9), MAX_SAMPLES)
+    try:
+        samples = twist_limits(kinematics, period, max_wheel_acceleration=acceleration, max_wheel_jerk=jerk).samples
+        taken = f"{samples}"
+    except KinematicsError:
+        # Of positive numbers, only the mean can be refused.
+        samples, taken = MAX_SAMPLES + 1, f"more than {MAX_SAMPLES}"
+    if samples > longest:
+        least = _four_digits(2 * acceleration / (longest * period), math.ceil)
+        message = (
+            f"it takes a mean of {taken} periods of control, by which the feedback would be too late at gains of "
+            f"{gain:.4g}/s; accepted: {least} or more, or a smaller max_wheel_acceleration, or smaller gains"
+        )
+        yield Problem(("controller", "max_wheel_jerk"), message, jerk)
+
+
+def _four_digits(value: float, rounding: Callable[[float], int]) -> str:
+    """A value of 0 or more, rounded so that it is still accepted."""
+    if value <= 0:
+        return "0"
+    unit = 10.0 ** (math.floor(math.log10(value)) - 3)
+    nearest = round(value / unit)
+    whole = nearest if math.isclose(value / unit, nearest, rel_tol=1e-12) else rounding(value / unit)
+    return f"{whole * unit:.4g}"
 
 
 def _period_problems(scenario: "Scenario", period: float) -> Iterator[Problem]:

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BeforeValidator, ConfigDict, Field, model_validator
+from pydantic import BeforeValidator, ConfigDict, Field, ValidationInfo, model_validator
 
 from rollerbench.description.part import Flag, NonNegative, Number, Part, Positive
 from rollerbench.kinematics.tracking import DEFAULT_GAINS, TrackingGains
@@ -103,11 +103,17 @@ class LegControl(Part):
 Controller = OpenLoop | PoseTracking | LegControl
 
 
-def with_type(value: Any) -> Any:
-    """A controller that leaves out its type: the one that has most of its fields, open_loop before the others."""
+def with_type(value: Any, info: ValidationInfo) -> Any:
+    """A controller that leaves out its type: the one that has most of its fields.
+
+    If two have as many it is open_loop, or else the one for the robot, which is validated before.
+    """
     if not isinstance(value, Mapping) or "type" in value:
         return value
-    kinds: dict[str, type[Part]] = {"open_loop": OpenLoop, "legs": LegControl, "pose_tracking": PoseTracking}
+    kinds: dict[str, type[Part]] = {"open_loop": OpenLoop, "pose_tracking": PoseTracking, "legs": LegControl}
+    robot = info.data.get("robot")
+    if robot is not None and robot.legs:
+        kinds = {"open_loop": OpenLoop, "legs": LegControl, "pose_tracking": PoseTracking}
     return {"type": max(kinds, key=lambda kind: len(value.keys() & kinds[kind].model_fields.keys())), **value}
 
 

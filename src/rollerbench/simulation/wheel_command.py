@@ -110,9 +110,11 @@ def _add_tracker(
     motion = scenario.motion.twist
     reference = builder.AddNamedSystem("reference", ReferenceSource(motion))
     ports |= {"reference_pose": reference.GetOutputPort("q_xyt"), "reference_twist": reference.GetOutputPort("v_xyw_B")}
-    # A twist that is held for a period lags by half of it: take the one in the middle.
+    # A twist that is held for a period lags by half of it, a mean of N by half of N - 1, and wheels that steer follow
+    # the limiter's twist of the period before: take the twist of the time when it will be driven.
+    periods = 0.5 * limiter.limits.samples + bool(scenario.robot.steered_wheels)
     ahead = builder.AddNamedSystem(
-        "feedforward", _source(replace(motion, breaks=motion.breaks - 0.5 * tracking.period))
+        "feedforward", _source(replace(motion, breaks=motion.breaks - periods * tracking.period))
     )
     builder.Connect(ports["reference_pose"], tracker.GetInputPort("reference_q_xyt"))
     builder.Connect(ahead.get_output_port(), tracker.GetInputPort("reference_v_xyw_B"))

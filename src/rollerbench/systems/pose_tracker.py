@@ -87,11 +87,11 @@ class PoseTracker(Diagram):
         """Builds the diagram.
 
         Args:
-            robot: The robot, or its kinematics.
+            robot: The robot, or its kinematics, with twists of Bo.
             gains: Gains.
 
         Raises:
-            KinematicsError: the robot's tyres allow no motion.
+            KinematicsError: the robot's tyres allow no motion, or the kinematics' twists are not those of Bo.
         """
         super().__init__()
         law = tracking_law(robot if isinstance(robot, WheelKinematics) else WheelKinematics(robot), gains)
