@@ -142,6 +142,7 @@ def test_steered_odometry_goes_where_the_steered_wheels_lead() -> None:
         (lambda: SteeringKinematics("swerve_base", 0.0), "period"),
         (lambda: SteeringKinematics("swerve_base", 0.01, [0.0]), "4 finite angles"),
         (lambda: ReferenceSource(held_with_ramps([1.0], 2.0, 0.5)), "1 components"),
+        (lambda: ReferenceSource([1.0, 0.0, 0.0]), "reference is a list"),
         (lambda: ReferenceSource(TURN, [0.0, np.nan, 0.0]), "start"),
     ],
 )

@@ -42,9 +42,14 @@ class ReferenceSource(Diagram):
             start: Pose (3,) at the start of a body twist [m, m, rad].
 
         Raises:
-            KinematicsError: the reference has not 3 components, or start is malformed.
+            KinematicsError: the reference is neither of these or has not 3 components, or start is malformed.
         """
         super().__init__()
+        if not isinstance(reference, Profile | Trajectory):
+            raise KinematicsError(
+                f"reference is a {type(reference).__name__}: accepted: a twist over time (Profile, such as the twist of "
+                "rollerbench.paths.time_optimal), or a Drake Trajectory of poses"
+            )
         size = reference.values.shape[1] if isinstance(reference, Profile) else reference.rows() * reference.cols()
         if size != 3:
             raise KinematicsError(
