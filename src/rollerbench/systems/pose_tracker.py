@@ -47,7 +47,7 @@ class ReferenceSource(Diagram):
         super().__init__()
         if not isinstance(reference, Profile | Trajectory):
             raise KinematicsError(
-                f"reference is a {type(reference).__name__}: accepted: a twist over time (Profile, such as the twist of "
+                f"reference is a {type(reference).__name__}: accepted: a twist over time (Profile, such as that of "
                 "rollerbench.paths.time_optimal), or a Drake Trajectory of poses"
             )
         size = reference.values.shape[1] if isinstance(reference, Profile) else reference.rows() * reference.cols()
