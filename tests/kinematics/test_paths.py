@@ -172,6 +172,15 @@ def test_a_free_yaw_passes_the_yaws_of_the_points(curve: Callable[..., paths.Leg
         (lambda: paths.spline([[1, 0]], yaw=[1, 2]), "yaw = "),
         (lambda: paths.spline([[1, 0]], tangent=True, yaw=[1]), "without tangent heading"),
         (lambda: paths.spline([1, 0]), "points = "),
+        (lambda: paths.spline([["a", 0]]), "points = "),
+        (lambda: paths.clothoid([[math.nan, 0]]), "points holds NaN"),
+        (lambda: paths.spline([[1, 0], [0, 0]], tangent=True), "turns back on itself"),
+        (lambda: paths.clothoid([[1, 0], [1, 1]], deviation=0.0), "deviation = 0.0: accepted: more than 0"),
+        (lambda: paths.clothoid([[1, 0], [1, 1]], deviation=math.nan), "deviation holds NaN"),
+        (lambda: paths.line([0, 0], [1, 0, 0]), "start = "),
+        (lambda: paths.line([0, 0, 0], [1, 0, math.nan]), "end holds NaN"),
+        (lambda: paths.arc(0.0, 1.0, tangent=True), "radius = 0.0: accepted: more than 0"),
+        (lambda: paths.arc(1.0, math.inf, tangent=True), "angle holds NaN or infinite"),
     ],
 )
 def test_what_is_no_path_is_said(make: Callable[[], paths.Leg], words: str) -> None:

@@ -59,7 +59,7 @@ def test_a_limit_is_reached_at_every_moment_and_none_exceeded(name: str) -> None
     assert np.mean(used > 0.99) > 0.93
     assert np.mean(used > 0.95) > 0.97
     assert run.duration == run.twist.breaks[-1]
-    assert set(run.active) <= run.usage.keys() <= {"speed", "steering", "adhesion", "effort"}
+    assert set(run.active) <= run.usage.keys() <= {"speed", "steering", "adhesion", "lift-off", "effort"}
     # The twist leads to the end of the path, and its wheels keep their speeds.
     time = np.linspace(0, run.duration, 2001)
     # Sharp corners cost the most: between two breaks the change of their curvature jumps.
@@ -95,7 +95,43 @@ def test_without_limits_of_speed_a_line_takes_what_friction_allows() -> None:
     ahead, back = rb.limits.max_acceleration(rb.load_robot(data), [0.0, math.pi]).value
     run = paths.time_optimal(rb.load_robot(data), [paths.line([0, 0, 0], [2, 0, 0])])
     assert run.duration == pytest.approx(math.sqrt(4 * (1 / ahead + 1 / back)), rel=1e-3)
-    assert set(run.usage) == {"adhesion"}
+    assert set(run.usage) == {"adhesion", "lift-off"}
+    assert set(run.active) == {"adhesion"}
+
+
+@pytest.mark.parametrize("robot", ["differential_cart", "kiwi"])
+def test_laps_are_planned_as_finely_as_one(robot: str) -> None:
+    legs = [paths.figure_eight(2.0, tangent=True)]
+    one, two, twenty = (paths.time_optimal(robot, paths.laps(legs, count)) for count in (1, 2, 20))
+    # The second lap starts at full speed, as all that follow.
+    assert (twenty.duration - one.duration) / 19 == pytest.approx(two.duration - one.duration, rel=0.01)
+    assert max(usage.max() for usage in twenty.usage.values()) < 1.01
+    reached = reference_poses(twenty.twist, twenty.twist.breaks, 16)[-1]
+    assert reached == pytest.approx(paths.laps(legs, 20)[0].q_xyt[-1], abs=1e-4)
+
+
+def test_sharp_corners_are_planned_right_or_refused() -> None:
+    sharp = paths.clothoid(BENT, deviation=0.05, tangent=True)
+    run = paths.time_optimal("differential_cart", [sharp])
+    assert max(usage.max() for usage in run.usage.values()) < 1.01
+    assert reference_poses(run.twist, run.twist.breaks)[-1] == pytest.approx(sharp.q_xyt[-1], abs=1e-4)
+    for deviation in (0.01, 1e-3):
+        with pytest.raises(rb.KinematicsError, match=r"too sharp.* larger deviation"):
+            paths.time_optimal("differential_cart", [paths.clothoid(BENT, deviation=deviation, tangent=True)])
+
+
+def test_a_margin_keeps_its_share_of_every_load() -> None:
+    robot, line = rb.load_robot("differential_cart"), paths.line([0, 0, 0], [3, 0, 0])
+    run = paths.time_optimal(robot, [line], margin=0.8)
+    v, rate = run.twist(run.time), run.twist.rate(run.time)
+    # Along a straight line b is [1, 0, 0] and does not change.
+    model = ContactForces(robot, np.tile([1.0, 0.0, 0.0], (len(v), 1)), 0.0, None, bend=np.zeros_like(v))
+    x, _ = least_norm(model)
+    loads = model.loads.at(x.at(np.column_stack([rate[:, 0], v[:, 0] ** 2])))
+    at_rest = model.loads.at(x.at(np.zeros((len(v), 2))))
+    kept = (loads / at_rest).min()
+    assert kept == pytest.approx(0.2, abs=1e-3)
+    assert run.usage["lift-off"].max() == pytest.approx(0.8, abs=1e-3)
 
 
 def test_margins_rates_and_friction_slow_it_down() -> None:
@@ -257,7 +293,18 @@ def _sideways(robot: rb.Robot) -> np.ndarray:
         ("kiwi", [], {}, "legs = "),
         ("kiwi", [paths.line([0, 0, 0], [1, 0, 0])], {"margin": 1.5}, "margin = 1.5: accepted: more than 0"),
         ("kiwi", [paths.line([0, 0, 0], [1, 0, 0])], {"wheel_acceleration": 0.0}, "wheel_acceleration = 0"),
+        (
+            "kiwi",
+            [paths.line([0, 0, 0], [1, 0, 0])],
+            {"sharing": "even"},
+            "sharing = 'even': accepted: 'least_norm' or",
+        ),
+        ("kiwi", [paths.line([0, 0, 0], [1, 0, 0])], {"pause": -1.0}, "pause = -1.0: accepted: a number of 0"),
+        ("kiwi", [paths.line([0, 0, 0], [1, 0, 0])], {"pause": math.nan}, "pause holds NaN"),
+        ("kiwi", [paths.line([0, 0, 0], [1, 0, 0])], {"roll_resistance": -0.1}, "roll_resistance = -0.1"),
+        ("kiwi", [paths.line([0, 0, 0], [1, 0, 0])], {"ground_friction": 0.0}, "however slowly"),
         ("kiwi", [paths.line([0, 0, 0], [0, 0, 0])], {}, "a leg stands still"),
+        ("kiwi", [paths.spline([[1, 0], [0, 0]])], {}, "turns back on itself.* at x, y, yaw = 0.99"),
         ("differential_cart", [paths.line([0, 0, 0], [0, 1, 0])], {}, r"skid sideways \(left, right\)"),
         (changed("kiwi", max_effort=0.01), [paths.line([0, 0, 0], [1, 0, 0])], {"roll_resistance": 0.05}, "however"),
     ],

@@ -58,6 +58,28 @@ def limit_cones(
     return cones, np.array(owners, dtype=np.intp), np.array(kinds, dtype="<U9")
 
 
+def with_rates(
+    model: ContactForces, largest: float, cones: Cones, kinds: NDArray[np.str_]
+) -> tuple[Cones, NDArray[np.str_]]:
+    """The cones, and those of the rates of the driven wheels' speeds."""
+    driven = [i for i, wheel in enumerate(model.robot.wheels) if wheel.driven]
+    radius = np.array([model.robot.wheels[i].radius for i in driven])
+    constant = np.zeros((len(model.u), len(driven), 3))
+    constant[..., 0] = 1.0
+    slope = np.zeros((*constant.shape, model.size))
+    slope[..., 1, : model.accelerations] = model.surface_rates[:, driven] / (radius * largest)[:, np.newaxis]
+    rates = Cones(constant=constant, slope=slope)
+    return joined(cones, rates), np.array([*kinds, *["wheel_acceleration"] * len(driven)])
+
+
+def joined(one: Cones, other: Cones) -> Cones:
+    """The cones of both."""
+    return Cones(
+        constant=np.concatenate([one.constant, other.constant], axis=1),
+        slope=np.concatenate([one.slope, other.slope], axis=1),
+    )
+
+
 def friction_coefficients(robot: Robot, ground: float | None) -> Array:
     """Coefficients of friction (n_wheels,) [-] of the wheels on a ground of another; None for each wheel's own.
 

@@ -20,7 +20,7 @@ from rollerbench.errors import InfeasibleTwist, KinematicsError
 from rollerbench.kinematics.limits.cone_program import Cones, maximize, section
 from rollerbench.kinematics.limits.contact_forces import Affine, ContactForces
 from rollerbench.kinematics.limits.efforts import least_norm
-from rollerbench.kinematics.limits.force_limits import friction_coefficients, limit_cones
+from rollerbench.kinematics.limits.force_limits import friction_coefficients, joined, limit_cones, with_rates
 from rollerbench.kinematics.limits.result import CAUSES
 from rollerbench.kinematics.limits.speed import speed_rows
 
@@ -36,6 +36,9 @@ INSIDE = 1e-4
 OPEN = 1e-9
 """Singular values and residuals below this count as zero, of equations scaled to 1."""
 
+SLIGHT = 1e-100
+"""Numbers below this count as no larger or smaller than it, so that their squares remain numbers."""
+
 WORST = 100.0
 """Usage that is not told from larger ones [-]."""
 
@@ -47,7 +50,8 @@ class PathLimits:
         robot: The robot.
         b: Twists (d, 3) per unit of the way.
         c: Their change per unit of the way (d, 3).
-        kinds: What may limit: "speed", "steering", "adhesion", "effort", "wheel_acceleration".
+        kinds: What may limit: "speed", "steering", "adhesion", "lift-off" (the share of a wheel's load at rest that is
+            gone), "effort", "wheel_acceleration".
     """
 
     def __init__(
@@ -68,7 +72,7 @@ class PathLimits:
             robot: The robot.
             b: Twists (d, 3) per unit of the way, not 0.
             c: Their change per unit of the way (d, 3).
-            margin: Share of each limit that may be used [-].
+            margin: Share of each limit that may be used [-]; wheels keep 1 - margin of their load at rest.
             sharing: As in `max_acceleration`.
             ground_friction: As in `max_acceleration`.
             roll_resistance: As in `max_acceleration`.
@@ -86,8 +90,13 @@ class PathLimits:
             raise KinematicsError(f"{robot.name} cannot follow the path: {CAUSES['drive']}")
         cones, _, kinds = limit_cones(self._model, friction_coefficients(robot, ground_friction), "circle")
         if wheel_acceleration is not None:
-            cones, kinds = _with_rates(self._model, wheel_acceleration, cones, kinds)
+            cones, kinds = with_rates(self._model, wheel_acceleration, cones, kinds)
         self._force_kinds = kinds
+        loads = self._model.loads
+        # Of loads over those at rest; free forces do not change them.
+        load = loads.constant + np.einsum("dwx,dx->dw", loads.slope, x.constant)
+        change = np.einsum("dwx,dxk->dwk", loads.slope, x.slope)
+        self._load_change = (change / np.where(load > 0, load, 1.0)[..., np.newaxis])[:, self._model.carrying]
         self._cones = Cones(
             constant=cones.constant + np.einsum("dmix,dx->dmi", cones.slope, x.constant),
             slope=np.einsum("dmix,dxk->dmik", cones.slope, x.slope),
@@ -102,13 +111,13 @@ class PathLimits:
         limits = np.array([getattr(w, "max_steering_speed", None) for w in swivels], dtype=np.float64)
         way, bend = _at(self.b, places), _at(self.c, places)
         turn = way[..., 0] * bend[..., 1] - way[..., 1] * bend[..., 0]
-        found["steering"] = np.abs(turn) / np.maximum(np.sum(way**2, axis=-1), np.finfo(float).tiny) / limits
+        found["steering"] = np.abs(turn) / np.maximum(np.sum(way**2, axis=-1), SLIGHT) / limits
         return {kind: usage.max(axis=1) for kind, usage in found.items() if usage.shape[1]}
 
     @property
     def kinds(self) -> tuple[str, ...]:
         """The limits that the robot has."""
-        return (*self.speeds, *dict.fromkeys(self._force_kinds.tolist()))
+        return (*self.speeds, *dict.fromkeys(self._force_kinds.tolist()), "lift-off")
 
     def ranges(self, cap: Array) -> tuple[Array, Array, Array]:
         """The set of (u, x) as a polygon, from inside.
@@ -122,9 +131,8 @@ class PathLimits:
         Raises:
             KinematicsError: the robot cannot even creep along the path.
         """
-        with np.errstate(divide="ignore"):
-            tops = [(self._margin / usage) ** 2 for usage in self.speeds.values()]
-        cap = np.min([cap, *tops], axis=0)
+        tops = [(self._margin / np.clip(usage, SLIGHT, 1 / SLIGHT)) ** 2 for usage in self.speeds.values()]
+        cap = np.maximum(np.min([cap, *tops], axis=0), SLIGHT)
         # Lines and arcs are the same all along.
         data = np.column_stack([self.b, self.c, np.log(cap)])
         _, first, which = np.unique(np.round(data, 9), axis=0, return_index=True, return_inverse=True)
@@ -149,9 +157,9 @@ class PathLimits:
             w = w + np.einsum("dmik,dk->dmi", self._cones.slope[..., 2:], self._fairest(w))
         size, room = np.hypot(w[..., 1], w[..., 2]), np.maximum(w[..., 0], np.finfo(float).tiny)
         shares = np.minimum(size / room, WORST)
-        return found | {
-            kind: shares[:, self._force_kinds == kind].max(axis=1) for kind in self.kinds if kind not in found
-        }
+        found |= {kind: shares[:, self._force_kinds == kind].max(axis=1) for kind in dict.fromkeys(self._force_kinds)}
+        gone = -np.einsum("dwk,dk->dw", self._load_change[..., :2], y)
+        return {str(kind): usage for kind, usage in found.items()} | {"lift-off": np.maximum(gone, 0.0).max(axis=1)}
 
     def _scaled(self, rows: NDArray[np.intp], unit: Array) -> Cones:
         """Cones at some points within the margin, over (u, x) in the units (d, 2)."""
@@ -159,7 +167,14 @@ class PathLimits:
         slope[..., :2] *= unit[:, np.newaxis, np.newaxis]
         constant[..., 0] *= self._margin
         slope[..., 0, :] *= self._margin
-        return Cones(constant=constant, slope=slope)
+        if self._margin == 1.0:
+            # Adhesion keeps the loads from below 0 as it is.
+            return Cones(constant=constant, slope=slope)
+        change = self._load_change[rows].copy()
+        change[..., :2] *= unit[:, np.newaxis]
+        kept = Cones(constant=np.zeros((*change.shape[:2], 3)), slope=np.zeros((*change.shape[:2], 3, change.shape[2])))
+        kept.constant[..., 0], kept.slope[..., 0, :] = self._margin, change
+        return joined(Cones(constant=constant, slope=slope), kept)
 
     def _highest(self, cones: Cones) -> Array:
         """The largest x (d,) of the sets, up to 1."""
@@ -172,7 +187,7 @@ class PathLimits:
             between.slope[:, :, 0, 1] = [1.0, -1.0]
             objective = np.zeros((count, size))
             objective[:, 1] = 1.0
-            z, feasible = maximize(objective, _joined(cones, between))
+            z, feasible = maximize(objective, joined(cones, between))
             found = np.where(feasible, np.minimum(z[:, 1], 1.0), 0.0)
         if not (found > OPEN).all():
             raise KinematicsError(f"{self.robot.name} cannot follow the path, however slowly")
@@ -207,7 +222,7 @@ class PathLimits:
         ceiling.slope[:, 0, 0, 0] = -1.0
         objective = np.zeros((len(w), 1 + size))
         objective[:, 0] = -1.0
-        z, _ = maximize(objective, _joined(Cones(constant=constant, slope=slope), ceiling))
+        z, _ = maximize(objective, joined(Cones(constant=constant, slope=slope), ceiling))
         return z[:, 1:]
 
 
@@ -248,20 +263,6 @@ def _balanced(model: ContactForces) -> tuple[Affine, NDArray[np.bool_]]:
     return Affine(constant=constant, slope=slope), able
 
 
-def _with_rates(
-    model: ContactForces, largest: float, cones: Cones, kinds: NDArray[np.str_]
-) -> tuple[Cones, NDArray[np.str_]]:
-    """The cones, and those of the rates of the driven wheels' speeds."""
-    driven = [i for i, wheel in enumerate(model.robot.wheels) if wheel.driven]
-    radius = np.array([model.robot.wheels[i].radius for i in driven])
-    constant = np.zeros((len(model.u), len(driven), 3))
-    constant[..., 0] = 1.0
-    slope = np.zeros((*constant.shape, model.size))
-    slope[..., 1, : model.accelerations] = model.surface_rates[:, driven] / (radius * largest)[:, np.newaxis]
-    rates = Cones(constant=constant, slope=slope)
-    return _joined(cones, rates), np.array([*kinds, *["wheel_acceleration"] * len(driven)])
-
-
 def _at_level(cones: Cones, x: Array) -> Array:
     """Values (d, m, 3) of the cones at x (d,) and u = 0."""
     return cones.constant + cones.slope[..., 1] * x[:, np.newaxis, np.newaxis]
@@ -276,13 +277,6 @@ def _bisected(holds: Callable[[Array], NDArray[np.bool_]], count: int) -> Array:
         inside = holds(middle)
         low, high = np.where(inside, middle, low), np.where(inside, high, middle)
     return low
-
-
-def _joined(one: Cones, other: Cones) -> Cones:
-    return Cones(
-        constant=np.concatenate([one.constant, other.constant], axis=1),
-        slope=np.concatenate([one.slope, other.slope], axis=1),
-    )
 
 
 def _at(twist: Array, places: Array) -> Array:

@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
 
 from rollerbench.errors import KinematicsError
+from rollerbench.kinematics.limits.result import finite, finite_number
 from rollerbench.kinematics.odometry import rotate
 from rollerbench.kinematics.paths.legs import NODES, Leg, leg
 
@@ -45,6 +46,10 @@ def spline(points: ArrayLike, *, tangent: bool = False, yaw: ArrayLike | None = 
         place, slope = curve(s), curve(s, 1)
         if not tangent:
             return place[:, 0], place[:, 1], turning(s)
+        back = np.sum(slope[1:] * slope[:-1], axis=1) < 0
+        if back.any():
+            at = place[int(np.argmax(back))].round(4).tolist()
+            raise KinematicsError(f"the path turns back on itself at {at}; accepted: points that lead around")
         heading = np.unwrap(np.arctan2(slope[:, 1], slope[:, 0]))
         x, y = rotate(-heading[0], place).T
         return x, y, heading - heading[0]
@@ -73,10 +78,12 @@ def clothoid(
         yaw: As for `spline`; it holds where the path is closest to a corner.
 
     Raises:
-        KinematicsError: a corner turns back.
+        KinematicsError: a corner turns back, or an argument is malformed.
 
     Source: Walton and Meek (2005), A controlled clothoid spline; with the arc of Fraichard and Scheuer (2004).
     """
+    if deviation is not None and not finite_number("deviation", deviation) > 0:
+        raise KinematicsError(f"deviation = {deviation!r}: accepted: more than 0 [m], or None")
     through = _from_origin(points)
     sides = np.diff(through, axis=0)
     length, heading = np.hypot(*sides.T), np.unwrap(np.arctan2(sides[:, 1], sides[:, 0]))
@@ -106,8 +113,8 @@ def clothoid(
 
 
 def _from_origin(points: ArrayLike) -> Array:
-    through = np.asarray(points, dtype=np.float64)
-    if through.ndim != 2 or through.shape[1] != 2 or not len(through) or not np.isfinite(through).all():
+    through = finite("points", points)
+    if through.ndim != 2 or through.shape[1] != 2 or not len(through):
         raise KinematicsError(f"points = {points!r}: accepted: one or more finite [x, y]")
     through = np.vstack([np.zeros((1, 2)), through])
     if (np.hypot(*np.diff(through, axis=0).T) < 1e-9).any():

@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
 
+from rollerbench.errors import KinematicsError
+from rollerbench.kinematics.limits.result import finite, finite_number
 from rollerbench.kinematics.odometry import rotate
 
 Array = NDArray[np.float64]
@@ -71,13 +73,17 @@ def leg(
 
 def line(start: ArrayLike, end: ArrayLike) -> Leg:
     """Straight from one pose (3,) to another, turning evenly on the way."""
-    a, b = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
+    a, b = finite("start", start), finite("end", end)
+    if a.shape != (3,) or b.shape != (3,):
+        raise KinematicsError(f"start = {start!r}, end = {end!r}: accepted: [x, y, yaw] each")
     return leg(lambda u: tuple((a + np.outer(u, b - a)).T))
 
 
 def arc(radius: float, angle: float, *, tangent: bool) -> Leg:
     """Along a circle from the origin, first to +x; to the left, or right if the angle is negative [m, rad]."""
-    side = math.copysign(1.0, angle)
+    if not finite_number("radius", radius) > 0:
+        raise KinematicsError(f"radius = {radius!r}: accepted: more than 0 [m]; a negative angle leads to the right")
+    side = math.copysign(1.0, finite_number("angle", angle))
 
     def pose(u: Array) -> tuple[ArrayLike, ArrayLike, ArrayLike]:
         turned = abs(angle) * u
