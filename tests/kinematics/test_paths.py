@@ -98,7 +98,7 @@ def test_waypoints_turn_the_shorter_way() -> None:
     assert all(leg.turn <= math.pi + 1e-9 for leg in legs)
 
 
-turns = st.lists(st.floats(-2.9, 2.9), min_size=1, max_size=4)
+turns = st.lists(st.floats(-2.5, 2.5), min_size=1, max_size=4)
 sides = st.lists(st.floats(0.2, 3.0), min_size=5, max_size=5)
 
 

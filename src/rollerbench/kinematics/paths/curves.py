@@ -149,7 +149,9 @@ def _roundings(turns: Array, length: Array, deviation: float | None) -> tuple[Ar
     bends = np.abs(turns) > 1e-9
     radius = np.where(bends, room / np.where(bends, before, 1.0), 0.0)
     if deviation is not None:
-        radius = np.minimum(radius, np.where(bends, deviation / np.where(bends, passed, 1.0), 0.0))
+        # Of the slightest corners rounding leaves no distance at all.
+        far = passed > 0
+        radius = np.minimum(radius, np.where(far, deviation / np.where(far, passed, 1.0), np.inf))
     return radius, radius * before
 
 
