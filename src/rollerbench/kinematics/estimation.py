@@ -24,20 +24,17 @@ delayed measurements in a discrete-time Kalman filter, for late fixes.
 """
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import block_diag
 
-from rollerbench.description import Robot
 from rollerbench.errors import KinematicsError
 from rollerbench.kinematics.belief import Belief, Fix, Interval, Rates, Three, Variances, crossed, with_fix
+from rollerbench.kinematics.given import AnyRobot, held_kinematics, positive_time
 from rollerbench.kinematics.uncertainty import UPPER, GyroNoise, OdometryNoise, checked_covariance
-from rollerbench.kinematics.wheels import WheelKinematics, held_kinematics
 
 Array = NDArray[np.float64]
 
@@ -113,7 +110,7 @@ class PoseFilter:
 
     def __init__(
         self,
-        robot: Robot | WheelKinematics | str | Path | Mapping[str, Any],
+        robot: AnyRobot,
         time_step: float,
         *,
         wheels: OdometryNoise,
@@ -261,8 +258,7 @@ def _checked(
 ) -> Array:
     """The standard deviations (3,) of a fix, if all parameters are accepted."""
     deviation = np.asarray(fix_deviation, dtype=np.float64)
-    if not (math.isfinite(time_step) and time_step > 0):
-        raise KinematicsError(f"time_step = {time_step}: accepted: a positive number of seconds")
+    positive_time("time_step", time_step)
     if not (math.isfinite(largest_latency) and largest_latency >= 0):
         raise KinematicsError(f"largest_latency = {largest_latency}: accepted: 0 s or more")
     if deviation.shape != (3,) or not (np.isfinite(deviation) & (deviation > 0)).all():

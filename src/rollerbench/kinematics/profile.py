@@ -106,10 +106,10 @@ def held_with_ramps(value: ArrayLike, duration: float, ramp: float) -> Profile:
     return sum_of_steps([0.0, duration - ramp], [ramp, duration], [held, -held])
 
 
-def reference_poses(twist: Profile, time: Array, substeps: int = 4) -> Array:
-    """Poses (k, 3) that a twist profile leads to from the origin at times (k,).
+def reference_poses(twist: Profile, time: Array, substeps: int = 4, *, start: ArrayLike = (0.0, 0.0, 0.0)) -> Array:
+    """Poses (k, 3) that a twist profile leads to from a start (3,), the origin by default, at times (k,).
 
     Each interval is cut into substeps whose mean twist is exact; where the twist keeps its direction so is the pose.
     """
     fine = np.interp(np.arange((len(time) - 1) * substeps + 1) / substeps, np.arange(len(time)), time)
-    return odometry.accumulate(np.zeros(3), twist.integral(fine))[::substeps]
+    return odometry.accumulate(start, twist.integral(fine))[::substeps]

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rollerbench.errors import KinematicsError
+from rollerbench.kinematics.given import positive_time
 from rollerbench.kinematics.wheels import WheelKinematics
 
 Array = NDArray[np.float64]
@@ -85,8 +86,7 @@ def twist_limits(
 
     Source: Biagiotti and Melchiorri (2012), FIR filters for online trajectory planning, for the mean as a filter.
     """
-    if not (math.isfinite(time_step) and time_step > 0):
-        raise KinematicsError(f"time_step = {time_step}: accepted: a positive number of seconds")
+    positive_time("time_step", time_step)
     wheels = kinematics.robot.driven_wheels
     own = np.array([wheel.max_speed or math.inf for wheel in wheels])
     unlimited = np.full(len(wheels), math.inf)

@@ -360,24 +360,6 @@ class WheelKinematics:
         return " and ".join("[" + ", ".join(f"{x:.3g}" for x in column + 0.0) + "]" for column in columns)
 
 
-def held_kinematics(robot: WheelKinematics | Robot | str | Path | Mapping[str, Any]) -> WheelKinematics:
-    """Kinematics in which wheel speeds alone tell the twist: those given, or those of a robot that does not steer.
-
-    Raises:
-        KinematicsError: the robot steers wheels, whose speeds mean nothing without their angles.
-    """
-    if isinstance(robot, WheelKinematics):
-        return robot
-    kinematics = WheelKinematics(robot)
-    if kinematics.robot.steered_wheels:
-        raise KinematicsError(
-            f"{kinematics.robot.name} steers wheels, and its wheel speeds mean nothing without their angles; accepted: "
-            "robots that do not steer, or its WheelKinematics at the swivel_angles at which they are held (on the "
-            "way see rollerbench.systems.SteeredOdometry, WheelKinematics.forward_at)"
-        )
-    return kinematics
-
-
 def _wrap(angle: Array) -> Array:
     """Angles [rad] brought into [-pi, pi]."""
     return (angle + np.pi) % (2 * np.pi) - np.pi

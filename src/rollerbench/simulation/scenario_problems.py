@@ -13,14 +13,10 @@ from rollerbench.kinematics.tracking import axle_speed, on_an_axle, tracking_law
 from rollerbench.kinematics.twist_limits import MAX_SAMPLES, twist_limits
 from rollerbench.simulation.commands import WheelEffortsCommand
 from rollerbench.simulation.leg_command import GaitCommand
-from rollerbench.simulation.settings import LegControl, OpenLoop, PoseTracking, WheelControl
+from rollerbench.simulation.settings import LARGEST_GAIN, LegControl, OpenLoop, PoseTracking, WheelControl
 
 if TYPE_CHECKING:
     from rollerbench.simulation.scenario import Scenario
-
-
-LARGEST_GAIN = 0.5
-"""Largest share of an error that feedback may take away in the time by which it is late; loops swing from 1.2 on."""
 
 
 def scenario_problems(scenario: "Scenario") -> Iterator[Problem]:

@@ -50,6 +50,10 @@ class OpenLoop(WheelControl):
     type: Literal["open_loop"] = "open_loop"
 
 
+LARGEST_GAIN = 0.5
+"""Largest share of an error that feedback may take away in the time by which it is late; loops swing from 1.2 on."""
+
+
 class PoseTracking(WheelControl):
     """Feedback that brings the robot back to the pose where its command has it (`rollerbench.systems.PoseTracker`).
 
@@ -75,10 +79,9 @@ class PoseTracking(WheelControl):
     @model_validator(mode="after")
     def _is_stable(self) -> Self:
         for name in ("position", "heading"):
-            if getattr(self, name) * self.period > 0.5:
-                raise ValueError(
-                    f"{name} = {getattr(self, name):g}: accepted: up to {0.5 / self.period:g}, 0.5 / period"
-                )
+            gain, most = getattr(self, name), LARGEST_GAIN / self.period
+            if gain > most:
+                raise ValueError(f"{name} = {gain:g}: accepted: up to {most:g}, {LARGEST_GAIN:g} / period")
         return self
 
     @property

@@ -11,7 +11,8 @@ from pydrake.systems.primitives import Multiplexer
 
 from rollerbench.errors import KinematicsError
 from rollerbench.kinematics.drivetrain import WheelDrive
-from rollerbench.systems.symbolic_block import symbolic_block
+from rollerbench.kinematics.given import positive_time
+from rollerbench.systems.symbolic_block import symbolic_block, variables
 
 
 class Drivetrain(Diagram):
@@ -42,8 +43,7 @@ class Drivetrain(Diagram):
             time_step: Period of the updates: the plant's [s].
         """
         super().__init__()
-        if not (math.isfinite(time_step) and time_step > 0):
-            raise KinematicsError(f"time_step = {time_step}: accepted: a positive number of seconds")
+        positive_time("time_step", time_step)
         if not drives:
             raise KinematicsError("drives is empty: accepted: one for each driven wheel, at least one")
         n = len(drives)
@@ -68,7 +68,7 @@ class Drivetrain(Diagram):
 
 def _play(drives: Sequence[WheelDrive], time_step: float) -> System:
     """From the commands to the leads g."""
-    leads, commands = (_variables(name, len(drives)) for name in ("lead", "command"))
+    leads, commands = (variables(name, len(drives)) for name in ("lead", "command"))
     crossings = [_crossing(*each, time_step) for each in zip(drives, leads, commands, strict=True)]
     return symbolic_block(
         state=leads,
@@ -81,7 +81,7 @@ def _play(drives: Sequence[WheelDrive], time_step: float) -> System:
 
 def _shaft(drives: Sequence[WheelDrive]) -> System:
     """From the wheels' angles to the shafts'."""
-    angles = _variables("angle", len(drives))
+    angles = variables("angle", len(drives))
     return symbolic_block(
         input=angles, output=[_shaft_angle(drive, angle) for drive, angle in zip(drives, angles, strict=True)]
     )
@@ -89,7 +89,7 @@ def _shaft(drives: Sequence[WheelDrive]) -> System:
 
 def _gear(drives: Sequence[WheelDrive], time_step: float) -> System:
     """From [shaft angles; leads; commands] to the speeds of the servos."""
-    shafts, leads, commands = (_variables(name, len(drives)) for name in ("shaft", "lead", "command"))
+    shafts, leads, commands = (variables(name, len(drives)) for name in ("shaft", "lead", "command"))
     speeds = []
     for drive, shaft, lead, command in zip(drives, shafts, leads, commands, strict=True):
         turn = time_step * command - _crossing(drive, lead, command, time_step)
@@ -100,7 +100,7 @@ def _gear(drives: Sequence[WheelDrive], time_step: float) -> System:
 
 def _encoder(drives: Sequence[WheelDrive], time_step: float) -> System:
     """From [shaft angles; leads] to the measured speeds; its state is where the motors were."""
-    before, shafts, leads = (_variables(name, len(drives)) for name in ("before", "shaft", "lead"))
+    before, shafts, leads = (variables(name, len(drives)) for name in ("before", "shaft", "lead"))
     dynamics, output = [], []
     for drive, last, shaft, lead in zip(drives, before, shafts, leads, strict=True):
         now = shaft + lead
@@ -136,7 +136,3 @@ def _counted(drive: WheelDrive, angle: Variable | Expression) -> Variable | Expr
         return angle
     count = 2 * np.pi / drive.counts
     return count * symbolic.floor(angle / count + 0.5)
-
-
-def _variables(name: str, count: int) -> list[Variable]:
-    return [Variable(f"{name}_{index}") for index in range(count)]

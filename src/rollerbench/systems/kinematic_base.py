@@ -10,9 +10,8 @@ from pydrake.systems.primitives import MatrixGain, SymbolicVectorSystem
 
 from rollerbench.description import FixedWheel
 from rollerbench.errors import KinematicsError
-from rollerbench.kinematics import WheelKinematics
-from rollerbench.kinematics.wheels import held_kinematics
-from rollerbench.systems.kinematics import AnyRobot, _se2_integrator, checked_pose
+from rollerbench.kinematics.given import AnyRobot, held_kinematics, kinematics_of, planar_pose
+from rollerbench.systems.kinematics import se2_integrator
 
 
 class KinematicBase(Diagram):
@@ -65,7 +64,7 @@ class KinematicBase(Diagram):
             raise KinematicsError(f"time_step = {time_step}: accepted: a positive number of seconds, or None")
         builder = DiagramBuilder()
         twist = builder.AddNamedSystem("twist", MatrixGain(_twist_matrix(robot, command)))
-        integrator = _rate_integrator() if time_step is None else _se2_integrator(time_step)
+        integrator = _rate_integrator() if time_step is None else se2_integrator(time_step)
         pose = builder.AddNamedSystem(self._INTEGRATOR, integrator)
         builder.Connect(twist.get_output_port(), pose.get_input_port())
         builder.ExportInput(twist.get_input_port(), command)
@@ -79,7 +78,7 @@ class KinematicBase(Diagram):
         Raises:
             KinematicsError: q_xyt is not finite or not of shape (3,).
         """
-        pose = checked_pose(q_xyt)
+        pose = planar_pose("q_xyt", q_xyt)
         mine = self.GetMutableSubsystemContext(self.GetSubsystemByName(self._INTEGRATOR), context)
         if mine.has_only_continuous_state():
             mine.SetContinuousState(pose)
@@ -90,7 +89,7 @@ class KinematicBase(Diagram):
 def _twist_matrix(robot: AnyRobot, command: str) -> NDArray[np.float64]:
     """M (3, n_inputs) of `KinematicBase`."""
     if command == "v_xyw_B":
-        kinematics = robot if isinstance(robot, WheelKinematics) else WheelKinematics(robot)
+        kinematics = kinematics_of(robot)
         tyres = [i for i, wheel in enumerate(kinematics.robot.wheels) if isinstance(wheel, FixedWheel)]
         return kinematics.project(np.eye(3), tyres).T
     if command != "wheel_speeds":

@@ -4,10 +4,6 @@ Each is a Diagram of Drake's gains and of formulas that Drake evaluates (`symbol
 convertible to AutoDiffXd and Expression with ToAutoDiffXd() and ToSymbolic().
 """
 
-from collections.abc import Mapping
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydrake import symbolic
@@ -15,14 +11,11 @@ from pydrake.symbolic import Expression, Variable, atan2, cos, sin, sqrt
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder, System
 from pydrake.systems.primitives import MatrixGain, Multiplexer
 
-from rollerbench.description import Robot
 from rollerbench.errors import KinematicsError
 from rollerbench.kinematics import WheelKinematics
+from rollerbench.kinematics.given import AnyRobot, held_kinematics, kinematics_of, planar_pose, positive_time
 from rollerbench.kinematics.uncertainty import UPPER, OdometryNoise, StepTerms, checked_covariance, spread, step_terms
-from rollerbench.kinematics.wheels import held_kinematics
 from rollerbench.systems.symbolic_block import symbolic_block
-
-AnyRobot = Robot | WheelKinematics | str | Path | Mapping[str, Any]
 
 
 class InverseKinematics(Diagram):
@@ -39,7 +32,7 @@ class InverseKinematics(Diagram):
 
     def __init__(self, robot: AnyRobot) -> None:
         super().__init__()
-        _wrap_gain(self, _kinematics(robot).drive_matrix, "v_xyw_B", "wheel_speeds")
+        _wrap_gain(self, kinematics_of(robot).drive_matrix, "v_xyw_B", "wheel_speeds")
 
 
 class ForwardKinematics(Diagram):
@@ -83,12 +76,11 @@ class Odometry(Diagram):
             KinematicsError: time_step is not positive, or the noise does not fit the robot.
         """
         super().__init__()
-        if not (np.isfinite(time_step) and time_step > 0):
-            raise KinematicsError(f"time_step = {time_step}: accepted: a positive number of seconds")
+        positive_time("time_step", time_step)
         kinematics = held_kinematics(robot)
         builder = DiagramBuilder()
         twist = builder.AddNamedSystem("forward_kinematics", MatrixGain(kinematics.forward_matrix))
-        pose = builder.AddNamedSystem(self._INTEGRATOR, _se2_integrator(time_step))
+        pose = builder.AddNamedSystem(self._INTEGRATOR, se2_integrator(time_step))
         builder.Connect(twist.get_output_port(), pose.get_input_port())
         wheel_speeds = builder.ExportInput(twist.get_input_port(), "wheel_speeds")
         builder.ExportOutput(pose.get_output_port(), "q_xyt")
@@ -109,7 +101,7 @@ class Odometry(Diagram):
             KinematicsError: q_xyt is not finite or not of shape (3,), or the covariance does not fit.
         """
         integrator = self.GetSubsystemByName(self._INTEGRATOR)
-        self.GetMutableSubsystemContext(integrator, context).SetDiscreteState(checked_pose(q_xyt))
+        self.GetMutableSubsystemContext(integrator, context).SetDiscreteState(planar_pose("q_xyt", q_xyt))
         if covariance is not None:
             if not self.HasSubsystemNamed(self._COVARIANCE):
                 raise KinematicsError("covariance: this Odometry was made without a noise; accepted: None")
@@ -151,22 +143,6 @@ class PlanarState(Diagram):
         builder.BuildInto(self)
 
 
-def checked_pose(q_xyt: ArrayLike) -> NDArray[np.float64]:
-    """A pose (3,).
-
-    Raises:
-        KinematicsError: it is not finite or not of that shape.
-    """
-    pose = np.asarray(q_xyt, dtype=np.float64)
-    if pose.shape != (3,) or not np.isfinite(pose).all():
-        raise KinematicsError(f"q_xyt = {q_xyt!r}: accepted: three finite numbers [x, y, yaw]")
-    return pose
-
-
-def _kinematics(robot: AnyRobot) -> WheelKinematics:
-    return robot if isinstance(robot, WheelKinematics) else WheelKinematics(robot)
-
-
 def _wrap_gain(diagram: Diagram, matrix: NDArray[np.float64], input_name: str, output_name: str) -> None:
     builder = DiagramBuilder()
     gain = builder.AddNamedSystem("gain", MatrixGain(matrix))
@@ -175,7 +151,7 @@ def _wrap_gain(diagram: Diagram, matrix: NDArray[np.float64], input_name: str, o
     builder.BuildInto(diagram)
 
 
-def _se2_integrator(time_step: float) -> System:
+def se2_integrator(time_step: float) -> System:
     x, y, yaw = pose = [Variable(name) for name in ("x", "y", "yaw")]
     vx, vy, wz = twist = [Variable(name) for name in ("vx", "vy", "wz")]
     # sin(half)/half without a branch: the tiny summand keeps it exact to the last bit, at half = 0 too.

@@ -19,6 +19,7 @@ from rollerbench.errors import KinematicsError
 from rollerbench.kinematics.gaits.plan import LegCommand, LegFeedback, LegMode, LegPlan
 from rollerbench.kinematics.gaits.planner import LegPlanner
 from rollerbench.kinematics.gaits.tracker import Tracked, held, track
+from rollerbench.kinematics.given import positive_time
 from rollerbench.kinematics.legs.group import LegGroup
 
 Array = NDArray[np.float64]
@@ -64,7 +65,7 @@ class GaitPlanner(LeafSystem):
             KinematicsError: the robot has no legs, or not this mode.
         """
         super().__init__()
-        _require_period(period)
+        positive_time("period", period)
         self.planner, self._period = LegPlanner(load_robot(robot)), period
         self._mode = mode or LegMode(posture=self.planner.robot.standing[0].name)
         start = self.planner.start(self._mode)
@@ -172,7 +173,7 @@ class LegInverseKinematics(LeafSystem):
             KinematicsError: the robot has no legs, or not this posture.
         """
         super().__init__()
-        _require_period(period)
+        positive_time("period", period)
         planner = LegPlanner(load_robot(robot))
         mode = LegMode(posture=posture or planner.robot.standing[0].name)
         planner.require(mode)
@@ -242,7 +243,7 @@ class LegTracker(LeafSystem):
     ):
         """Makes the system for a robot; arguments as of `GaitPlanner`, and the unit vector (3,) against gravity."""
         super().__init__()
-        _require_period(period)
+        positive_time("period", period)
         self._planner, self._period = LegPlanner(load_robot(robot)), period
         start = self._planner.start(mode)
         self._group: LegGroup = self._planner.group
@@ -307,8 +308,3 @@ def _planned(planner: LegPlanner, plan: LegPlan) -> Tracked:
     """Legs that are where the plan has them."""
     q, _, _ = planner.group.inverse(planner.centers_B(plan), plan.hold, iterations=10)
     return held(q, np.zeros(len(q)))
-
-
-def _require_period(period: float) -> None:
-    if not (np.isfinite(period) and period > 0):
-        raise KinematicsError(f"period = {period}: accepted: a positive number of seconds")

@@ -9,8 +9,8 @@ from pydrake.common.value import Value
 from pydrake.systems.framework import BasicVector, Context, LeafSystem, State
 
 from rollerbench.kinematics.estimation import PoseEstimate, PoseFilter
+from rollerbench.kinematics.given import AnyRobot
 from rollerbench.kinematics.uncertainty import GyroNoise, OdometryNoise
-from rollerbench.systems.kinematics import AnyRobot
 
 OUTPUTS: dict[str, tuple[int, Any]] = {
     "q_xyt": (3, lambda estimate: estimate.q_xyt),

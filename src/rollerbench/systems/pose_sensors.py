@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
 
 from rollerbench.errors import KinematicsError
+from rollerbench.kinematics.given import positive_time
 from rollerbench.kinematics.uncertainty import GyroNoise
 
 Array = NDArray[np.float64]
@@ -42,7 +43,7 @@ class GyroSensor(LeafSystem):
             KinematicsError: an argument is not accepted.
         """
         super().__init__()
-        _require_positive("time_step", time_step)
+        positive_time("time_step", time_step)
         if not math.isfinite(bias):
             raise KinematicsError(f"bias = {bias}: accepted: a finite number [rad/s]")
         self._seed, self._period = _checked(seed), time_step
@@ -90,7 +91,7 @@ class PoseFixSensor(LeafSystem):
             KinematicsError: an argument is not accepted.
         """
         super().__init__()
-        _require_positive("period", period)
+        positive_time("period", period)
         if not (math.isfinite(latency) and latency >= 0):
             raise KinematicsError(f"latency = {latency}: accepted: 0 s or more")
         self._deviation = np.asarray(deviation, dtype=np.float64)
@@ -136,8 +137,3 @@ def _checked(seed: int) -> int:
     if not (isinstance(seed, int | np.integer) and 0 <= seed < 2**63):
         raise KinematicsError(f"seed = {seed}: accepted: a whole number of 0 or more")
     return int(seed)
-
-
-def _require_positive(field: str, value: float) -> None:
-    if not (math.isfinite(value) and value > 0):
-        raise KinematicsError(f"{field} = {value}: accepted: a positive number of seconds")

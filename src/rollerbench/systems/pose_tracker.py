@@ -1,9 +1,6 @@
 """Reference motions, and the feedback that keeps a base on them, as Drake Systems."""
 
 import math
-from collections.abc import Mapping
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,9 +9,9 @@ from pydrake.systems.framework import Diagram, DiagramBuilder, System
 from pydrake.systems.primitives import Demultiplexer, Multiplexer, TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial, Trajectory
 
-from rollerbench.description import Robot
 from rollerbench.errors import KinematicsError
-from rollerbench.kinematics import WheelKinematics, odometry
+from rollerbench.kinematics import odometry
+from rollerbench.kinematics.given import AnyRobot, kinematics_of, planar_pose
 from rollerbench.kinematics.profile import Profile, reference_poses
 from rollerbench.kinematics.tracking import DEFAULT_GAINS, TrackingGains, tracking_law
 from rollerbench.systems.symbolic_block import symbolic_block
@@ -86,9 +83,7 @@ class PoseTracker(Diagram):
         v_xyw_B (3): twist to command [m/s, m/s, rad/s]; limit it with a `TwistLimiter`.
     """
 
-    def __init__(
-        self, robot: Robot | WheelKinematics | str | Path | Mapping[str, Any], gains: TrackingGains = DEFAULT_GAINS
-    ) -> None:
+    def __init__(self, robot: AnyRobot, gains: TrackingGains = DEFAULT_GAINS) -> None:
         """Builds the diagram.
 
         Args:
@@ -99,7 +94,7 @@ class PoseTracker(Diagram):
             KinematicsError: the robot's tyres allow no motion, or the kinematics' twists are not those of Bo.
         """
         super().__init__()
-        law = tracking_law(robot if isinstance(robot, WheelKinematics) else WheelKinematics(robot), gains)
+        law = tracking_law(kinematics_of(robot), gains)
         names = ("q_xyt", "reference_q_xyt", "reference_v_xyw_B")
         variables = [[Variable(f"{name}_{index}") for index in range(3)] for name in names]
         with np.errstate(invalid="ignore"):  # numpy takes flags that Expressions raise for errors of its own
@@ -117,19 +112,14 @@ class PoseTracker(Diagram):
 
 def _twist_source(twist: Profile, start: ArrayLike) -> TrajectorySource:
     """[q_xyt; v_xyw_B] of a twist over time."""
-    first = np.asarray(start, dtype=np.float64)
-    if first.shape != (3,) or not np.isfinite(first).all():
-        raise KinematicsError(f"start = {start!r}: accepted: three finite numbers [x, y, yaw]")
+    first = planar_pose("start", start)
     pieces = max(1, math.ceil(np.ptp(twist.breaks) / SAMPLE_TIME))
     even = np.linspace(twist.breaks[0], twist.breaks[-1], pieces + 1)
     # Close to a break no even sample is needed; nearly equal times make no pieces.
     apart = np.abs(even[:, np.newaxis] - twist.breaks).min(axis=1) > 1e-3 * SAMPLE_TIME
     times = np.sort(np.concatenate([twist.breaks, even[apart]]))
-    moved = reference_poses(twist, times)
-    yaw = first[2] + moved[:, 2]
-    poses = np.column_stack([first[:2] + odometry.rotate(first[2], moved[:, :2]), yaw])
-    twists = twist(times)
-    rates = np.column_stack([odometry.rotate(yaw, twists[:, :2]), twists[:, 2]])
+    poses, twists = reference_poses(twist, times, start=first), twist(times)
+    rates = np.column_stack([odometry.rotate(poses[:, 2], twists[:, :2]), twists[:, 2]])
     trajectory = PiecewisePolynomial.CubicHermite(
         times, np.column_stack([poses, twists]).T, np.column_stack([rates, twist.rate(times)]).T
     )

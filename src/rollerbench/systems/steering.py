@@ -1,17 +1,14 @@
 """Kinematics of bases with steered wheels as Drake Systems, at a period of control."""
 
-import math
-from collections.abc import Mapping, Sequence
-from pathlib import Path
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
 from pydrake.systems.framework import Context, DiscreteValues, EventStatus, LeafSystem
 
-from rollerbench.description import Robot
 from rollerbench.errors import KinematicsError
-from rollerbench.kinematics import WheelKinematics, odometry
+from rollerbench.kinematics import odometry
+from rollerbench.kinematics.given import AnyRobot, kinematics_of, planar_pose, positive_time
 from rollerbench.kinematics.steering import steering_step
 
 
@@ -29,7 +26,7 @@ class SteeringKinematics(LeafSystem):
 
     def __init__(
         self,
-        robot: Robot | WheelKinematics | str | Path | Mapping[str, Any],
+        robot: AnyRobot,
         period: float,
         start: ArrayLike | None = None,
     ) -> None:
@@ -44,8 +41,8 @@ class SteeringKinematics(LeafSystem):
             KinematicsError: the period is not positive, the robot has no steered wheels, or start is malformed.
         """
         super().__init__()
-        self._kinematics = robot if isinstance(robot, WheelKinematics) else WheelKinematics(robot)
-        self._period = _positive(period)
+        self._kinematics = kinematics_of(robot)
+        self._period = positive_time("period", period)
         steered, driven = self._kinematics.robot.steered_wheels, self._kinematics.robot.driven_wheels
         if not steered:
             raise KinematicsError(f"{self._kinematics.robot.name} has no steered wheels; accepted: InverseKinematics")
@@ -77,7 +74,7 @@ class SteeredOdometry(LeafSystem):
         q_xyt (3): pose of B in W; the yaw counts full turns [m, m, rad].
     """
 
-    def __init__(self, robot: Robot | WheelKinematics | str | Path | Mapping[str, Any], period: float) -> None:
+    def __init__(self, robot: AnyRobot, period: float) -> None:
         """Makes the system; the pose starts at the origin.
 
         Args:
@@ -88,8 +85,8 @@ class SteeredOdometry(LeafSystem):
             KinematicsError: the period is not positive.
         """
         super().__init__()
-        self._kinematics = robot if isinstance(robot, WheelKinematics) else WheelKinematics(robot)
-        self._period = _positive(period)
+        self._kinematics = kinematics_of(robot)
+        self._period = positive_time("period", period)
         wheels = self._kinematics.robot.wheels
         self._steered: Sequence[int] = [index for index, wheel in enumerate(wheels) if wheel.steered]
         self._speeds = self.DeclareVectorInputPort("wheel_speeds", len(self._kinematics.robot.driven_wheels))
@@ -98,8 +95,12 @@ class SteeredOdometry(LeafSystem):
         self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._update)
 
     def set_pose(self, context: Context, q_xyt: ArrayLike) -> None:
-        """Sets the pose (3,) in a context of this system."""
-        context.SetDiscreteState(np.asarray(q_xyt, np.float64))
+        """Sets the pose (3,) in a context of this system.
+
+        Raises:
+            KinematicsError: q_xyt is not finite or not of shape (3,).
+        """
+        context.SetDiscreteState(planar_pose("q_xyt", q_xyt))
 
     def _update(self, context: Context, state: DiscreteValues) -> EventStatus:
         swivel = np.zeros(len(self._kinematics.robot.wheels))
@@ -108,9 +109,3 @@ class SteeredOdometry(LeafSystem):
         pose = odometry.integrate(context.get_discrete_state(0).value(), twist, self._period)
         state.get_mutable_vector(0).SetFromVector(pose)
         return EventStatus.Succeeded()
-
-
-def _positive(period: float) -> float:
-    if not (math.isfinite(period) and period > 0):
-        raise KinematicsError(f"period = {period}: accepted: a positive number of seconds")
-    return period

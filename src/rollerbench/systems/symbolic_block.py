@@ -105,6 +105,11 @@ def symbolic_block(
     )
 
 
+def variables(name: str, count: int) -> list[Variable]:
+    """Variables by a name and their number."""
+    return [Variable(f"{name}_{index}") for index in range(count)]
+
+
 def _formula(variables: Sequence[Variable], expressions: Sequence[Variable | Expression]) -> SymbolicVectorSystem:
     """The expressions of the variables, which are a state: that is set three times as fast as an input."""
     return SymbolicVectorSystem(

@@ -17,10 +17,10 @@ from pydrake.systems.primitives import (
 )
 
 from rollerbench.errors import KinematicsError
+from rollerbench.kinematics.given import AnyRobot, kinematics_of
 from rollerbench.kinematics.limits.result import finite
 from rollerbench.kinematics.twist_limits import PerWheel, TwistLimits, twist_limits
-from rollerbench.systems.kinematics import AnyRobot, _kinematics
-from rollerbench.systems.symbolic_block import symbolic_block
+from rollerbench.systems.symbolic_block import symbolic_block, variables
 
 Array = NDArray[np.float64]
 Symbols: TypeAlias = Sequence[Variable | Expression]
@@ -100,7 +100,7 @@ class TwistLimiter(Diagram):
             KinematicsError: an argument is malformed or does not fit the robot.
         """
         super().__init__()
-        kinematics = _kinematics(robot)
+        kinematics = kinematics_of(robot)
         self.limits: TwistLimits = twist_limits(
             kinematics,
             time_step,
@@ -174,7 +174,7 @@ def _append(builder: DiagramBuilder, output: OutputPort, name: str, system: Syst
 
 def _moved(reference: Array) -> System:
     """From [twist of C; p_BoCo_B] to the twist of the reference point."""
-    twist, center = _variables("twist", 3), _variables("center", 2)
+    twist, center = variables("twist", 3), variables("center", 2)
     return symbolic_block(input=[*twist, *center], output=_at(reference, twist, center))
 
 
@@ -185,7 +185,7 @@ def _displacement(limits: TwistLimits, reference: Array, time_step: float) -> li
     comes closer to that in each step. If the load is still above 1, the last step goes below: k / load^2. So the scale
     may be too small, by what is left of the error, but the direction is exact. `_largest` gives squares of loads.
     """
-    rate, center, scale = _variables("rate", 3), _variables("center", 2), Variable("scale")
+    rate, center, scale = variables("rate", 3), variables("center", 2), Variable("scale")
     turn = np.zeros((1, 2, 3))
     turn[0, 0, 2] = time_step / LARGEST_TURN
     maps = np.concatenate([_finite_maps(limits.maps, limits.speeds), turn])
@@ -205,14 +205,14 @@ def _displacement(limits: TwistLimits, reference: Array, time_step: float) -> li
 
 
 def _speed(limits: TwistLimits) -> System:
-    twist = _variables("twist", 3)
+    twist = variables("twist", 3)
     factor = sqrt(_largest(_finite_maps(limits.maps, limits.speeds), twist, 1.0))
     return symbolic_block(input=twist, output=[component / factor for component in twist])
 
 
 def _held(limits: TwistLimits, time_step: float) -> System:
     """The state w, which approaches the target."""
-    held, target = _variables("held", 3), _variables("target", 3)
+    held, target = variables("held", 3), variables("target", 3)
     maps = _finite_maps(limits.maps, limits.speed_changes)
     changes = [there - here for here, there in zip(held, target, strict=True)]
     factor = sqrt(_largest(maps, changes, 1.0))
@@ -276,10 +276,6 @@ def _logarithm(rate: Symbols, scale: Variable, time_step: float) -> list[Express
     away = sqrt(half * half + 1e-24)
     along = away * cos(away) / sin(away)
     return [along * vx + half * vy, along * vy - half * vx, wz]
-
-
-def _variables(name: str, count: int) -> list[Variable]:
-    return [Variable(f"{name}_{index}") for index in range(count)]
 
 
 def _expressions(symbols: Symbols) -> list[Expression]:

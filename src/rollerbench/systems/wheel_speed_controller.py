@@ -14,6 +14,7 @@ from pydrake.systems.primitives import Multiplexer
 from rollerbench.description import Robot, load_robot
 from rollerbench.description.mass import axle_inertia
 from rollerbench.errors import KinematicsError
+from rollerbench.kinematics.given import positive_time
 from rollerbench.systems.symbolic_block import symbolic_block
 
 LAG = 0.02
@@ -97,8 +98,7 @@ class WheelSpeedController(Diagram):
                 number is not that of the driven wheels.
         """
         super().__init__()
-        if not (math.isfinite(time_step) and time_step > 0):
-            raise KinematicsError(f"time_step = {time_step}: accepted: a positive number of seconds")
+        positive_time("time_step", time_step)
         robot = load_robot(robot)
         wheels = robot.driven_wheels
         gains = wheel_speed_gains(robot, time_step) if gains is None else list(gains)

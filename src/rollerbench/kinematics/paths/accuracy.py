@@ -3,7 +3,6 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from rollerbench.kinematics.odometry import rotate
 from rollerbench.kinematics.profile import Profile, reference_poses
 
 Array = NDArray[np.float64]
@@ -20,8 +19,7 @@ CREEP = 1e-3
 
 def end_error(twist: Profile, start: Array, end: Array, scale: Array) -> float:
     """How far a twist from a pose (3,) misses another [m]; scale (3,) is 1, 1 and the radius where yaw counts [m]."""
-    moved = reference_poses(twist, twist.breaks, SUBSTEPS)[-1]
-    reached = np.append(start[:2] + rotate(start[2], moved[:2]), start[2] + moved[2])
+    reached = reference_poses(twist, twist.breaks, SUBSTEPS, start=start)[-1]
     return float(np.linalg.norm((reached - end) * scale))
 
 
