@@ -152,6 +152,7 @@ def _wrap_gain(diagram: Diagram, matrix: NDArray[np.float64], input_name: str, o
 
 
 def se2_integrator(time_step: float) -> System:
+    """From a twist (3) to the pose (3), its state, advanced every time step by the exponential of SE(2)."""
     x, y, yaw = pose = [Variable(name) for name in ("x", "y", "yaw")]
     vx, vy, wz = twist = [Variable(name) for name in ("vx", "vy", "wz")]
     # sin(half)/half without a branch: the tiny summand keeps it exact to the last bit, at half = 0 too.
