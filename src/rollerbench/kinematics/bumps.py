@@ -8,6 +8,10 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 
 
+STEP_WIDTH = 20.0
+"""Width of steps across the way, which are bumps for legs [m]."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Bumps:
     """Spheres whose tops rise above level ground at z = 0.

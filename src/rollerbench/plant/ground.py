@@ -9,8 +9,9 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
 from pydrake.multibody.tree import RigidBody, SpatialInertia
 
+from rollerbench import palette
 from rollerbench.errors import SimulationError
-from rollerbench.kinematics.bumps import Bumps
+from rollerbench.kinematics.bumps import STEP_WIDTH, Bumps
 
 RIGID = 1e12
 """Stiffness of ground that does not give [N/m]: the wheels' own stiffness then decides."""
@@ -20,11 +21,8 @@ BUMPS = "ground_bumps"
 """Name of the body that carries the ground's bumps."""
 
 
-STEP_COLOR = [0.62, 0.66, 0.70, 1.0]
-"""Colour of steps."""
-
-STEPS, STEP_WIDTH = "ground_steps", 20.0
-"""Name of the body that carries the ground's steps, and their width [m]."""
+STEPS = "ground_steps"
+"""Name of the body that carries the ground's steps."""
 
 
 def add_ground(
@@ -68,7 +66,7 @@ def add_ground(
             # Reaching below the plane, so that no edge lies in it.
             box, place = Box(end - start, STEP_WIDTH, 2 * height), RigidTransform([0.5 * (start + end), 0.0, 0.0])
             plant.RegisterCollisionGeometry(body, place, box, f"step_{index}", properties)
-            plant.RegisterVisualGeometry(body, place, box, f"step_{index}", STEP_COLOR)
+            plant.RegisterVisualGeometry(body, place, box, f"step_{index}", [*palette.STEP, 1.0])
     return _add_bumps(plant, bumps, properties) if bumps is not None and len(bumps.radii) else None
 
 

@@ -12,10 +12,6 @@ from rollerbench.description.inertia import RigidInertia
 from rollerbench.sdf.contact import contact_dissipation, contact_stiffness
 
 DRAKE = "drake.mit.edu"
-BODY_COLOR = (0.20, 0.35, 0.55)
-HUB_COLOR = (0.35, 0.35, 0.38)
-SPOKE_COLOR = (0.95, 0.60, 0.10)
-TYRE_COLOR = (0.12, 0.12, 0.13)
 
 
 def add_joint(

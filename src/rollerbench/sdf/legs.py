@@ -5,12 +5,10 @@ from lxml import etree
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from rollerbench import palette
 from rollerbench.description import Leg, Link, Robot
 from rollerbench.sdf import names
 from rollerbench.sdf.elements import (
-    HUB_COLOR,
-    SPOKE_COLOR,
-    TYRE_COLOR,
     add,
     add_contact,
     add_fixed_joint,
@@ -23,8 +21,6 @@ from rollerbench.sdf.elements import (
     sphere,
 )
 
-LINK_COLORS = ((0.35, 0.35, 0.38), (0.30, 0.50, 0.72), (0.35, 0.35, 0.38), (0.72, 0.74, 0.78))
-"""Of the links from the hip on, in turn: hip, femur, knee, tibia of a leg of four joints."""
 Z_TO_X = Rotation.from_euler("y", 90, degrees=True)
 
 
@@ -40,7 +36,7 @@ def add_legs(model: etree._Element, robot: Robot) -> None:
             element = add(model, "link", name=names.leg_link(leg.name, number))
             add_pose(element, step[:3, 3], Rotation.from_matrix(step[:3, :3]), relative_to=parent)
             add_inertial(element, link.inertia)
-            _add_link_visuals(element, link, LINK_COLORS[(number - 1) % len(LINK_COLORS)])
+            _add_link_visuals(element, link, palette.LEG_LINKS[(number - 1) % len(palette.LEG_LINKS)])
             add_joint(
                 model,
                 names.leg_joint(leg.name, number),
@@ -68,10 +64,10 @@ def _add_foot(model: etree._Element, robot: Robot, leg: Leg, foot: etree._Elemen
     wheel, joint = leg.wheel, names.drive_joint(leg.name)
     add_inertial(foot, wheel.inertia)
     add_contact(add_shape(foot, "collision", "tyre", sphere(wheel.radius)), robot, friction=wheel.friction)
-    add_shape(foot, "visual", "tyre", cylinder(wheel.radius, wheel.width), color=TYRE_COLOR)
+    add_shape(foot, "visual", "tyre", cylinder(wheel.radius, wheel.width), color=palette.TYRE)
     spoke = box((0.9 * wheel.radius, 0.2 * wheel.radius, 1.04 * wheel.width))
     ahead = np.array([0.5 * wheel.radius, 0.0, 0.0])
-    add_shape(foot, "visual", "spoke", spoke, position=ahead, color=SPOKE_COLOR)
+    add_shape(foot, "visual", "spoke", spoke, position=ahead, color=palette.MARK)
     if wheel.driven:
         effort, inertia = wheel.max_effort or -1.0, wheel.rotor_inertia
         name = foot.get("name")
@@ -82,7 +78,7 @@ def _add_foot(model: etree._Element, robot: Robot, leg: Leg, foot: etree._Elemen
 
 def _add_link_visuals(element: etree._Element, link: Link, color: tuple[float, float, float]) -> None:
     """A ball at the joint, and a rod along d and then one along a."""
-    add_shape(element, "visual", "joint", sphere(1.2 * link.radius), color=HUB_COLOR)
+    add_shape(element, "visual", "joint", sphere(1.2 * link.radius), color=palette.HUB)
     if link.d:
         rod = cylinder(link.radius, abs(link.d))
         add_shape(element, "visual", "along_d", rod, position=np.array([0.0, 0.0, 0.5 * link.d]), color=color)

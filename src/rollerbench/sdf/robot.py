@@ -8,6 +8,7 @@ from lxml import etree
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from rollerbench import palette
 from rollerbench.description import AnyWheel, Robot, RollerWheel
 from rollerbench.description.mass import (
     body_inertia,
@@ -20,11 +21,7 @@ from rollerbench.description.mass import (
 from rollerbench.description.rollers import RollerRing
 from rollerbench.sdf import names
 from rollerbench.sdf.elements import (
-    BODY_COLOR,
     DRAKE,
-    HUB_COLOR,
-    SPOKE_COLOR,
-    TYRE_COLOR,
     add,
     add_contact,
     add_drake,
@@ -39,7 +36,6 @@ from rollerbench.sdf.elements import (
 from rollerbench.sdf.legs import add_legs
 from rollerbench.sdf.window import Window
 
-ROLLER_COLORS = ((0.12, 0.12, 0.13), (0.55, 0.55, 0.58))
 Z_TO_AXLE = Rotation.from_euler("x", 90, degrees=True)
 """Turns SDF's cylinders, which lie along z, onto the axle."""
 Z_TO_ROLLER_AXIS = Rotation.from_euler("y", 90, degrees=True)
@@ -82,7 +78,7 @@ def _add_body(model: etree._Element, robot: Robot) -> None:
     link = add(model, "link", name=names.BODY)
     add_inertial(link, body_inertia(robot.body))
     shape, center = box(robot.body.size), np.array(robot.body.box_center)
-    add_shape(link, "visual", "box", shape, position=center, color=BODY_COLOR)
+    add_shape(link, "visual", "box", shape, position=center, color=palette.BODY)
     collision = add_shape(link, "collision", "box", shape, position=center)
     tyres = (*robot.wheels, *(leg.wheel for leg in robot.legs))
     add_contact(collision, robot, friction=min(tyre.friction for tyre in tyres))
@@ -90,7 +86,7 @@ def _add_body(model: etree._Element, robot: Robot) -> None:
     length, width, height = robot.body.size
     mark = box((0.06 * length, 0.5 * width, 0.1 * height))
     ahead = center + np.array([0.45 * length, 0.0, 0.5 * height])
-    add_shape(link, "visual", "front", mark, position=ahead, color=SPOKE_COLOR)
+    add_shape(link, "visual", "front", mark, position=ahead, color=palette.MARK)
 
 
 def _add_wheel(model: etree._Element, robot: Robot, wheel: AnyWheel, window: Window | None) -> None:
@@ -118,7 +114,7 @@ def _add_fork(model: etree._Element, wheel: AnyWheel, heading: Rotation) -> None
     add_pose(link, wheel.p_BoHo_B, heading, relative_to=names.BODY)
     add_inertial(link, fork_inertia(wheel))
     column = cylinder(0.25 * wheel.width, 0.6 * wheel.radius)
-    add_shape(link, "visual", "column", column, position=np.array([0, 0, 1.2 * wheel.radius]), color=HUB_COLOR)
+    add_shape(link, "visual", "column", column, position=np.array([0, 0, 1.2 * wheel.radius]), color=palette.HUB)
     effort = (getattr(wheel, "max_steering_effort", None) or -1.0) if wheel.steered else 0.0
     speed = getattr(wheel, "max_steering_speed", None)
     add_joint(model, names.swivel_joint(wheel.name), names.BODY, link.get("name"), "0 0 1", effort, speed=speed)
@@ -126,10 +122,10 @@ def _add_fork(model: etree._Element, wheel: AnyWheel, heading: Rotation) -> None
 
 def _add_hub_visuals(hub: etree._Element, wheel: AnyWheel) -> None:
     radius = hub_radius(wheel)
-    color = HUB_COLOR if isinstance(wheel, RollerWheel) else TYRE_COLOR
+    color = palette.HUB if isinstance(wheel, RollerWheel) else palette.TYRE
     add_shape(hub, "visual", "hub", cylinder(radius, wheel.width), rotation=Z_TO_AXLE, color=color)
     spoke = box((0.2 * radius, 1.04 * wheel.width, 0.9 * radius))
-    add_shape(hub, "visual", "spoke", spoke, position=np.array([0, 0, 0.5 * radius]), color=SPOKE_COLOR)
+    add_shape(hub, "visual", "spoke", spoke, position=np.array([0, 0, 0.5 * radius]), color=palette.MARK)
 
 
 def _add_rollers(
@@ -172,5 +168,5 @@ def _add_barrel_visuals(
             cylinder(radius, 2 * half_length),
             position=center,
             rotation=rotation * Z_TO_ROLLER_AXIS,
-            color=ROLLER_COLORS[index % 2],
+            color=palette.ROLLERS[index % 2],
         )
