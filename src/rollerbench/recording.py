@@ -43,6 +43,7 @@ WHEEL_COLUMNS: dict[str, str] = {
     "drive_y": "-",
     "rolling_radius": "m",
     "first_roller": "-",
+    **dict.fromkeys(("force_x", "force_y", "force_z"), "N"),
 }
 """Columns of each wheel, named wheel.column, and their units.
 
@@ -52,7 +53,8 @@ motor. contact_x and contact_y are where the wheel touches the ground, from Bo a
 slip_x and slip_y are the velocity of the wheel's or roller's surface over the ground along them; depth is the
 penetration, negative in the air. With the velocity v_C of the body over the contact, drive = (drive_x, drive_y) along
 these axes and rolling_radius are those of drive . v_C = rolling_radius speed + drive . slip, the equation that the
-wheel really obeys. Velocities at the contact are those of the step that starts with the sample, as the engine finds
+wheel really obeys. force is what the ground does to the wheel, along the same axes; it is recorded on request only
+(recording.forces). Velocities at the contact are those of the step that starts with the sample, as the engine finds
 them.
 """
 

@@ -3,9 +3,6 @@
 import math
 from collections.abc import Callable
 
-import numpy as np
-from numpy.typing import NDArray
-from pydrake.geometry import Meshcat
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator
 
 from rollerbench.errors import DescriptionError, SimulationError
@@ -13,7 +10,6 @@ from rollerbench.simulation.drake_config import simulator_config
 from rollerbench.simulation.log import Progress
 from rollerbench.simulation.scenario import Scenario
 from rollerbench.simulation.watch import CHUNK
-from rollerbench.visualization.scene import dress_scene
 
 
 def configure(simulator: Simulator, scenario: Scenario) -> None:
@@ -26,14 +22,6 @@ def configure(simulator: Simulator, scenario: Scenario) -> None:
         ApplySimulatorConfig(simulator_config(scenario), simulator)
     except (RuntimeError, ValueError, SystemExit) as error:
         raise DescriptionError(f"simulator: Drake refuses these settings: {error}") from error
-
-
-def start_recording(meshcat: Meshcat, scenario: Scenario, reference_q_xyt: NDArray[np.float64]) -> None:
-    """Dresses the scene of a run along a reference path (n, 3), and records it from here on."""
-    dress_scene(meshcat, scenario.robot, reference_q_xyt)
-    meshcat.StartRecording(
-        frames_per_second=scenario.recording.frames_per_second, set_visualizations_while_recording=True
-    )
 
 
 def advance(

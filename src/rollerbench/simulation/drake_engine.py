@@ -2,16 +2,14 @@
 
 import time
 
-import numpy as np
 from pydrake.geometry import Meshcat
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
 
 from rollerbench.errors import SimulationError
-from rollerbench.kinematics.profile import reference_poses
 from rollerbench.plant import follow_rollers
-from rollerbench.simulation.advance import advance, configure, start_recording
+from rollerbench.simulation.advance import advance, configure
 from rollerbench.simulation.log import Progress, Simulated, provenance, recording_of, station_samples
 from rollerbench.simulation.scenario import Scenario
 from rollerbench.simulation.station import Station
@@ -33,9 +31,6 @@ def simulate(scenario: Scenario, *, meshcat: Meshcat | None = None, progress: Pr
         _stand_at_rest(simulator, station, scenario)
     except (RuntimeError, SystemExit) as error:
         raise SimulationError(f"{scenario.name}: Drake cannot let the robot stand: {error}") from error
-    if meshcat is not None:
-        times = np.arange(0.0, scenario.duration, scenario.plant.time_step)
-        start_recording(meshcat, scenario, reference_poses(scenario.motion.twist, times))
     started = time.perf_counter()
     model, plant_context = station.parts.model, _plant_context(station, simulator)
     failure = advance(simulator, scenario, lambda: fault(model, plant_context), progress)

@@ -12,7 +12,6 @@ from rollerbench.errors import ResourceError
 from rollerbench.recording import Recording
 from rollerbench.report.figures import run_figures
 from rollerbench.report.page import run_page
-from rollerbench.sdf import robot_to_sdf
 from rollerbench.simulation.log import Simulated
 from rollerbench.simulation.picture import diagram_svg
 from rollerbench.simulation.scenario import Scenario
@@ -52,6 +51,7 @@ def write_folder(
     scenario: Scenario,
     recording: Recording,
     summary: Mapping[str, Any],
+    model: str,
     page: str | None,
     second: Simulated | None = None,
 ) -> None:
@@ -65,7 +65,7 @@ def write_folder(
         files: dict[str, str | None] = {
             "scenario.yaml": _resolved(scenario),
             "robot.yaml": to_yaml(scenario.robot),
-            "model.sdf": robot_to_sdf(scenario.simulated_robot),
+            "model.sdf": model,
             "summary.json": json.dumps(summary, indent=2, allow_nan=False) + "\n",
             "report.html": run_page(summary, figures, has_recording=page is not None),
             "recording.html": page,

@@ -8,7 +8,7 @@ from pydrake.geometry import Meshcat
 from pydrake.systems.analysis import Simulator
 
 from rollerbench.plant import RobotModel
-from rollerbench.simulation.advance import advance, configure, start_recording
+from rollerbench.simulation.advance import advance, configure
 from rollerbench.simulation.leg_log import leg_recording
 from rollerbench.simulation.leg_station import LegStation
 from rollerbench.simulation.log import Progress, Simulated
@@ -25,13 +25,10 @@ def simulate(scenario: Scenario, *, meshcat: Meshcat | None = None, progress: Pr
     Raises:
         DescriptionError: the legs cannot do what they are asked, or Drake refuses a setting.
     """
-    reference = scenario.rehearsal.reference
     station = LegStation(scenario, meshcat=meshcat, log=True, visuals=meshcat is not None)
     simulator = Simulator(station)
     configure(simulator, scenario)
     simulator.Initialize()
-    if meshcat is not None:
-        start_recording(meshcat, scenario, reference)
     started = time.perf_counter()
     watch = _Watch(simulator, station)
     failure = advance(simulator, scenario, watch.look, progress) or watch.halted

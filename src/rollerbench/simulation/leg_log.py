@@ -12,7 +12,7 @@ from rollerbench.kinematics.legs.stance import stance_next, stance_start
 from rollerbench.kinematics.odometry import rotate
 from rollerbench.recording import Recording
 from rollerbench.simulation.leg_station import LegStation
-from rollerbench.simulation.log import versions
+from rollerbench.simulation.log import ground_of, versions
 from rollerbench.simulation.scenario import Scenario
 
 Array = NDArray[np.float64]
@@ -70,6 +70,7 @@ def _provenance(scenario: Scenario) -> dict[str, object]:
         **versions(),
         "robot_description": scenario.robot.model_dump(mode="json", exclude_none=True),
         "legs": [leg.name for leg in scenario.robot.legs],
+        "ground": ground_of(scenario),
     }
 
 

@@ -94,6 +94,7 @@ class LegStation(Diagram):
         contact_efforts (nv): the contacts' forces on the velocities of the robot's model instance, as the plant orders
             them [N, N m].
         normal_forces (n_legs): loads of the feet [N].
+        contact_forces (3 n_legs): forces of the ground on the feet in W, foot by foot [N].
         slip (n_legs): how fast feet slide over the ground [m/s].
         odometry (3): pose from the legs that stand [m, m, rad]; with a closed loop only.
         contact_results: Drake's ContactResults.
@@ -171,6 +172,7 @@ class LegStation(Diagram):
             "motor_efforts": servo.GetOutputPort("motor_efforts"),
             "contact_efforts": plant.get_generalized_contact_forces_output_port(model.model_instance),
             "normal_forces": contacts.GetOutputPort("normal_forces"),
+            "contact_forces": contacts.GetOutputPort("contact_forces"),
             "slip": contacts.GetOutputPort("slip_speeds"),
             "contact_results": plant.get_contact_results_output_port(),
             "query_object": scene_graph.get_query_output_port(),

@@ -39,6 +39,7 @@ class Samples:
         effort: Torques (n, n_driven) of their motors [N m].
         odometry: Poses (n, 3) from the measured speeds [m, m, rad].
         first_roller: First simulated rollers (n,) of wheels of whose rollers only some are, by name.
+        contact_forces: Forces (n, 3 n_wheels) of the ground on the wheels in W [N], where they were recorded.
     """
 
     time: Array
@@ -48,6 +49,7 @@ class Samples:
     effort: Array
     odometry: Array
     first_roller: Mapping[str, Array] = field(default_factory=dict)
+    contact_forces: Array | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,9 +79,20 @@ def provenance(scenario: Scenario, engine: str) -> dict[str, Any]:
         "robot_description": scenario.robot.model_dump(mode="json", exclude_none=True),
         "injected": {name: robot.model_dump(mode="json", exclude_none=True) for name, robot in injected.items()},
         "rollers": scenario.wheel_control.rollers,
+        "ground": ground_of(scenario),
         "feedback": scenario.tracking is not None,
         "drivetrain": scenario.errors.drives(scenario.robot) is not None,
     }
+
+
+def ground_of(scenario: Scenario) -> dict[str, Any]:
+    """What rises above the ground, so that it can be drawn."""
+    bumps = scenario.bumps
+    caps = None
+    if bumps is not None:
+        places = {"centers": bumps.centers_W[:, :2], "half_widths": bumps.half_widths, "heights": bumps.heights}
+        caps = {name: values.tolist() for name, values in places.items()}
+    return {"steps": [step.model_dump() for step in scenario.ground.steps], "bumps": caps}
 
 
 def versions() -> dict[str, str]:
@@ -111,6 +124,7 @@ def station_samples(station: Station, scenario: Scenario, context: Context) -> S
         first_roller={}
         if model.roller_window is None
         else {name: data["rollers"][:, offset] for name, offset in model.roller_window.offsets.items()},
+        contact_forces=data.get("contact_forces"),
     )
 
 
@@ -138,6 +152,8 @@ def recording_of(samples: Samples, scenario: Scenario, metadata: Mapping[str, An
     columns |= _named(("odometry_x", "odometry_y", "odometry_yaw"), samples.odometry)
     columns |= _wheel_columns(scenario.robot, samples)
     columns |= _contact_columns(scenario.simulated_robot, motion, scenario.bumps)
+    if samples.contact_forces is not None:
+        columns |= _force_columns(scenario.robot, motion, samples.contact_forces)
     return Recording(columns=columns, wheel_names=scenario.robot.wheel_names, metadata=metadata)
 
 
@@ -231,6 +247,15 @@ def _contact_columns(robot: Robot, motion: RobotMotion, bumps: Bumps | None) -> 
             "rolling_radius": contact.rolling_radius,
         }
         columns |= {f"{wheel.name}.{name}": value for name, value in values.items()}
+    return columns
+
+
+def _force_columns(robot: Robot, motion: RobotMotion, forces: Array) -> dict[str, Array]:
+    columns: dict[str, Array] = {}
+    for wheel, force in zip(robot.wheels, np.split(forces, len(robot.wheels), axis=1), strict=True):
+        aside = rotate(-motion.q_xyt[:, 2], force[:, :2])
+        along = np.column_stack([aside, force[:, 2]])
+        columns |= _named(tuple(f"{wheel.name}.force_{axis}" for axis in "xyz"), along)
     return columns
 
 

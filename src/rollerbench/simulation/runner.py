@@ -10,12 +10,14 @@ from pydrake.geometry import Meshcat
 
 from rollerbench.errors import RollerbenchWarning, SimulationError
 from rollerbench.recording import Recording
+from rollerbench.sdf import robot_to_sdf
 from rollerbench.simulation import drake_engine, leg_engine, mujoco_engine, picture
 from rollerbench.simulation.folder import check_folder, write_folder
 from rollerbench.simulation.log import Progress, Simulated
 from rollerbench.simulation.scenario import Scenario, load_scenario
 from rollerbench.simulation.summary import apart, cross_check, summarize
-from rollerbench.visualization.scene import SIMULATED_COLOR, draw_path, local_meshcat
+from rollerbench.visualization.page import scene_page
+from rollerbench.visualization.scenes import SeenRun, scene_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,15 +74,11 @@ def run(
     if scenario.engine != "drake":
         mujoco_engine.check(scenario)
     _warn_about_step(scenario)
-    keep_page = scenario.recording.html and folder is not None and scenario.engine != "mujoco"
-    if meshcat is None and keep_page:
-        meshcat = local_meshcat()
 
     simulated = _simulated(scenario, meshcat, progress)
     recording, failure = simulated.recording, simulated.failure
     if not len(recording.time):
         raise SimulationError(f"{scenario.name}: {failure}; nothing was recorded")
-    page = _page(meshcat, scenario, recording) if meshcat is not None and scenario.engine != "mujoco" else None
     second = half = None
     try:
         if scenario.engine == "both" and failure is None:
@@ -98,7 +96,8 @@ def run(
         second=cross_check(second, recording) if second is not None else None,
     )
     if folder is not None:
-        write_folder(folder, scenario, recording, summary, page if keep_page else None, second)
+        model = robot_to_sdf(scenario.simulated_robot)
+        write_folder(folder, scenario, recording, summary, model, _page(scenario, recording, summary, model), second)
     result = RunResult(
         scenario=scenario,
         recording=recording,
@@ -119,11 +118,14 @@ def _simulated(scenario: Scenario, meshcat: Meshcat | None = None, progress: Pro
     return drake_engine.simulate(scenario, meshcat=meshcat, progress=progress)
 
 
-def _page(meshcat: Meshcat, scenario: Scenario, recording: Recording) -> str:
-    draw_path(meshcat, "simulated", recording.q_xyt, SIMULATED_COLOR, lift=0.004 * scenario.robot.body.size[0])
-    meshcat.StopRecording()
-    meshcat.PublishRecording()
-    return meshcat.StaticHtml()
+def _page(scenario: Scenario, recording: Recording, summary: Mapping[str, Any], model: str) -> str | None:
+    """The text of recording.html; None if there shall be none."""
+    settings = scenario.recording
+    if not settings.html:
+        return None
+    run = SeenRun(name=scenario.name, recording=recording, model=model, summary=summary)
+    marks = {"forces": settings.forces, "slip": settings.slip}
+    return scene_page(scene_of([run], view=settings.camera, frames_per_second=settings.frames_per_second, **marks))
 
 
 def _at_half_step(scenario: Scenario) -> Scenario:

@@ -207,9 +207,15 @@ class RecordingSettings(Part):
     Attributes:
         html: Whether to write the self-contained Meshcat page recording.html.
         frames_per_second: Frames of that page [1/s].
+        camera: Where it looks from: "iso", at the whole path from aside; "top", from above; "follow", at the robot.
+        forces: Whether to record the forces of the ground on the wheels, and to show them.
+        slip: Whether to show where wheels slid.
         diagram: Whether to draw the simulated diagram as diagram.svg.
     """
 
     html: Flag = True
     frames_per_second: Annotated[Positive, Field(le=200)] = 30.0
+    camera: Literal["iso", "top", "follow"] = "iso"
+    forces: Flag = False
+    slip: Flag = False
     diagram: Flag = False

@@ -20,7 +20,7 @@ from rollerbench.simulation.wheel_command import CommandFrom, add_command, drive
 from rollerbench.systems import Odometry, PlanarState, SlipMonitor, SteeredOdometry
 from rollerbench.visualization.scene import add_bump_visuals, add_ground_visual, add_meshcat
 
-LOGGED = ("state", "wheel_speed_command", "wheel_speeds", "net_actuation", "odometry", "rollers")
+LOGGED = ("state", "wheel_speed_command", "wheel_speeds", "net_actuation", "odometry", "rollers", "contact_forces")
 """Outputs that a run records."""
 
 
@@ -67,6 +67,7 @@ class Station(Diagram):
         net_actuation (n_actuators): torques of the motors, as the plant orders them [N m].
         slip (n_wheels): how fast wheels slide over the ground [m/s] (`SlipMonitor`).
         normal_forces (n_wheels): loads of the wheels [N].
+        contact_forces (3 n_wheels): forces of the ground on the wheels in W, wheel by wheel [N].
         state (nq + nv): state of the robot's model instance, as the plant orders it.
         reference_pose (3), reference_twist (3), twist_command (3): what the controller tracks, and what it commands;
             only where it tracks poses.
@@ -132,7 +133,7 @@ class Station(Diagram):
         logs = {}
         if log:
             for name in LOGGED:
-                if name in outputs:
+                if name in outputs and (name != "contact_forces" or scenario.recording.forces):
                     logs[name] = LogVectorOutput(outputs[name], builder, publish_period=scenario.plant.time_step)
         if meshcat is not None:
             add_meshcat(builder, scene_graph, meshcat, scenario.recording.frames_per_second)
@@ -198,7 +199,7 @@ def _add_sensors(
         monitor = builder.AddNamedSystem("slip_monitor", SlipMonitor(model))
         builder.Connect(outputs["contact_results"], monitor.GetInputPort("contact_results"))
         outputs |= {"slip": monitor.GetOutputPort("slip_speeds")}
-        outputs |= {"normal_forces": monitor.GetOutputPort("normal_forces")}
+        outputs |= {name: monitor.GetOutputPort(name) for name in ("normal_forces", "contact_forces")}
     if model.roller_window is not None:
         outputs["rollers"] = model.roller_window.GetOutputPort("rollers")
     return outputs

@@ -31,6 +31,7 @@ class SlipMonitor(LeafSystem):
         slip_speeds (n_wheels): speed of the wheel's or roller's surface over the ground, where it is fastest [m/s]; 0
             for a wheel in the air. In the order of robot.yaml.
         normal_forces (n_wheels): load of each wheel [N].
+        contact_forces (3 n_wheels): force of the ground on each wheel in W, wheel by wheel x, y, z [N].
     """
 
     def __init__(self, model: RobotModel) -> None:
@@ -41,6 +42,7 @@ class SlipMonitor(LeafSystem):
         count = len(model.robot.wheels or model.robot.legs)
         self.DeclareVectorOutputPort("slip_speeds", count, self._calc_slip)
         self.DeclareVectorOutputPort("normal_forces", count, self._calc_loads)
+        self.DeclareVectorOutputPort("contact_forces", 3 * count, self._calc_forces)
 
     def _calc_slip(self, context: Context, output: BasicVector) -> None:
         slip = np.zeros(output.size())
@@ -59,6 +61,17 @@ class SlipMonitor(LeafSystem):
             for wheel in _wheels_in(info, self._wheel_of):
                 loads[wheel] += _normal_force(info)
         output.SetFromVector(loads)
+
+    def _calc_forces(self, context: Context, output: BasicVector) -> None:
+        forces = np.zeros((output.size() // 3, 3))
+        contacts = self._contacts.Eval(context)
+        for index in range(contacts.num_point_pair_contacts()):
+            info = contacts.point_pair_contact_info(index)
+            # Drake tells the force on body B.
+            for body, sign in ((info.bodyA_index(), -1.0), (info.bodyB_index(), 1.0)):
+                if int(body) in self._wheel_of:
+                    forces[self._wheel_of[int(body)]] += sign * info.contact_force()
+        output.SetFromVector(forces.ravel())
 
 
 class RollResistance(LeafSystem):

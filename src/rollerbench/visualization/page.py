@@ -182,6 +182,7 @@ def _marks(scene: Scene) -> dict[str, Any]:
         ],
         "has_slip": slip,
         "support": any("support/" in path for path in scene.tracks),
+        "shown": scene.shown,
         "support_color": _css(palette.SUPPORT),
         "force_color": _css(palette.FORCE),
     }

@@ -86,6 +86,7 @@ class Scene:
         tracks: Poses (n, 4, 4) of each moving frame by path.
         cameras: The views.
         view: The one at the start.
+        shown: Which marks are seen at the start: "forces", "slip".
         pitch: Distance of the finest grid lines [m].
     """
 
@@ -95,6 +96,7 @@ class Scene:
     tracks: Mapping[str, Array]
     cameras: Mapping[View, Camera]
     view: View
+    shown: frozenset[str]
     pitch: float
 
     @property
@@ -124,8 +126,8 @@ def scene_of(
     runs: Sequence[SeenRun],
     *,
     view: View = "iso",
-    forces: bool = True,
-    slip: bool = True,
+    forces: bool = False,
+    slip: bool = False,
     frames_per_second: float = 30.0,
 ) -> Scene:
     """The scene of one or several runs.
@@ -133,8 +135,8 @@ def scene_of(
     Args:
         runs: What to show, overlaid.
         view: The view at the start.
-        forces: Whether to show the contacts' forces, of runs that recorded them.
-        slip: Whether to show where wheels slid.
+        forces: Whether to show the contacts' forces at the start, of runs that recorded them.
+        slip: Whether to show where wheels slid at the start.
         frames_per_second: How often frames move [1/s].
     """
     robots = [robot_of(run.recording) for run in runs]
@@ -148,7 +150,7 @@ def scene_of(
         color = palette.RUNS[index % len(palette.RUNS)]
         motion = motion_of(run.recording, robot, frames_per_second)
         own, poses = _robot(run, robot, motion, prefix, None if len(runs) == 1 else color)
-        for extra, more in _extras(run, robot, motion, prefix, forces=forces, slip=slip):
+        for extra, more in _extras(run, robot, motion, prefix):
             own += extra
             poses |= more
         own += _trails(run, robot, prefix, color)
@@ -169,6 +171,7 @@ def scene_of(
         tracks=tracks,
         cameras=cameras(low, high, size, robots[0]),
         view=view,
+        shown=frozenset(name for name, on in (("forces", forces), ("slip", slip)) if on),
         pitch=0.1 if any(item.name == "fine_grid" for item in floor) else 1.0,
     )
 
@@ -210,13 +213,9 @@ def _robot(
     return items, {**tracks, f"{prefix}ghost": motion.X_WR}
 
 
-def _extras(
-    run: SeenRun, robot: Robot, motion: Motion, prefix: str, *, forces: bool, slip: bool
-) -> list[tuple[list[Item], dict[str, Array]]]:
-    found: list[tuple[list[Item], dict[str, Array]]] = []
-    if slip:
-        found.append((marks.skid_marks(run.recording, robot, prefix), {}))
-    if forces and marks.has_forces(run.recording, robot):
+def _extras(run: SeenRun, robot: Robot, motion: Motion, prefix: str) -> list[tuple[list[Item], dict[str, Array]]]:
+    found: list[tuple[list[Item], dict[str, Array]]] = [(marks.skid_marks(run.recording, robot, prefix), {})]
+    if marks.has_forces(run.recording, robot):
         found.append(marks.forces(run.recording, robot, motion, prefix))
     if robot.legs:
         found.append((marks.footholds(run.recording, robot, prefix), {}))
