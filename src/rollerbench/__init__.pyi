@@ -44,3 +44,5 @@ from .simulation import Scenario as Scenario
 from .simulation import build_station as build_station
 from .simulation import load_scenario as load_scenario
 from .simulation import run as run
+from .visualization.replay import Replay as Replay
+from .visualization.replay import replay as replay

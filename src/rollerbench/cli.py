@@ -3,13 +3,16 @@
 import sys
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Annotated, Protocol
+from typing import TYPE_CHECKING, Annotated, Protocol
 
 import typer
 
 from rollerbench.errors import RollerbenchError, RollerbenchWarning, SimulationError
+
+if TYPE_CHECKING:
+    from rollerbench.visualization.scenes import View
 
 app = typer.Typer(
     name="rollerbench",
@@ -179,6 +182,36 @@ def analyze(
     _print(f"Written: {done.folder / 'report.html'}")
 
 
+@app.command(epilog="Example: rollerbench replay runs/left runs/slippery --html both.html")
+def replay(
+    runs: Annotated[list[Path], typer.Argument(help="Run folders; several are overlaid.")],
+    html: Annotated[
+        Path | None, typer.Option("--html", help="Write one HTML file instead of showing it.", show_default=False)
+    ] = None,
+    camera: Annotated[str, typer.Option(help="iso, top, or follow: with the first robot.")] = "iso",
+    forces: Annotated[bool, typer.Option("--forces", help="Show forces of the ground, if recorded.")] = False,
+    slip: Annotated[bool, typer.Option("--slip", help="Show where wheels slid.")] = False,
+    host: Annotated[str, typer.Option(help="Address to listen at; * lets other machines look.")] = "localhost",
+    port: Annotated[int, typer.Option(help="Port to listen at.", show_default="any free one", min=0, max=65535)] = 0,
+    open_: Annotated[bool, typer.Option("--open/--no-open", help="Open a browser.")] = True,
+) -> None:
+    """Show stored runs without simulating them again; needs no Drake."""
+    from rollerbench.visualization.replay import replay as replay_runs
+    from rollerbench.visualization.serve import serve_page
+
+    shown = replay_runs([*runs], camera=_view(camera), forces=forces, slip=slip)
+    if html is not None:
+        _print(f"Written: {shown.write(html)}")
+        return
+
+    def ready(address: str) -> None:
+        print(f"{address} (Ctrl-C ends)", file=sys.stderr)
+        _browse(address, wanted=open_)
+
+    with suppress(KeyboardInterrupt):
+        serve_page(shown.page(), host=host, port=port, ready=ready)
+
+
 @app.command(epilog="Example: rollerbench build youbot_base")
 def build(
     robots: Annotated[
@@ -249,6 +282,23 @@ def schema(
 
         model = Scenario
     print(json.dumps(model.model_json_schema(), indent=2))
+
+
+def _view(camera: str) -> "View":
+    from rollerbench.visualization.scenes import DIRECTIONS
+
+    for view in DIRECTIONS:
+        if camera == view:
+            return view
+    raise RollerbenchError(f"--camera {camera!r}: accepted: {', '.join(DIRECTIONS)}")
+
+
+def _browse(address: str, *, wanted: bool) -> None:
+    """Opens a browser, if somebody sits at the terminal."""
+    import webbrowser
+
+    if wanted and sys.stdout.isatty():
+        webbrowser.open(address)
 
 
 @contextmanager

@@ -5,7 +5,8 @@ import itertools
 import json
 import math
 from collections.abc import Iterator
-from importlib.resources import files
+from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -39,7 +40,7 @@ def scene_page(scene: Scene) -> str:
     data = b"".join(_framed(umsgpack.packb(command)) for command in commands(scene))
     return environment.get_template("scene.html.j2").render(
         title=", ".join(run.name for run in scene.runs),
-        viewer=Markup(files("meshcat").joinpath("viewer/dist/main.min.js").read_text(encoding="utf-8")),
+        viewer=Markup(_viewer()),
         data=base64.b64encode(data).decode("ascii"),
         runs=[_legend(scene, run) for run in scene.runs],
         settings=Markup(_inert(json.dumps(_settings(scene)))),
@@ -48,6 +49,14 @@ def scene_page(scene: Scene) -> str:
         simulated=_css(palette.SIMULATED),
         reference=_css(palette.REFERENCE),
     )
+
+
+def _viewer() -> str:
+    """The script of the viewer, from the package's files: to import it would start parts of a server."""
+    spec = find_spec("meshcat")
+    assert spec is not None
+    assert spec.origin is not None
+    return (Path(spec.origin).parent / "viewer" / "dist" / "main.min.js").read_text(encoding="utf-8")
 
 
 def commands(scene: Scene) -> Iterator[Command]:
@@ -152,7 +161,7 @@ def _legend(scene: Scene, run: SceneRun) -> dict[str, Any]:
     summary = run.summary
     error, lines = summary["pose_error"], []
     percent = error["percent_of_path"]
-    share = "" if percent is None else f" ({percent:.2f} % of the path)"
+    share = "" if percent is None else f" ({percent:.2f} % of path)"
     lines.append(("Position error", f"{1e3 * error['final_position']:.1f} mm{share}"))
     lines.append(("Yaw error", f"{math.degrees(error['final_yaw']):.2f} deg"))
     if "wheel_slip" in summary:

@@ -153,7 +153,10 @@ def scene_of(
         for extra, more in _extras(run, robot, motion, prefix):
             own += extra
             poses |= more
-        own += _trails(run, robot, prefix, color)
+        if not any(_same_reference(run, other) for other in runs[:index]):
+            own += marks.ghost(robot, f"{prefix}ghost")
+            own += _trail(run.recording.reference_q_xyt, "reference", palette.REFERENCE, robot, prefix)
+        own += _trail(run.recording.q_xyt, "simulated", color, robot, prefix)
         items += own
         tracks |= poses
         times |= dict.fromkeys(poses, motion.time)
@@ -201,7 +204,7 @@ def robot_of(recording: Recording) -> Robot:
 def _robot(
     run: SeenRun, robot: Robot, motion: Motion, prefix: str, color: Color | None
 ) -> tuple[list[Item], dict[str, Array]]:
-    """The robot and its ghost; in a colour of its own among several."""
+    """The robot, in a colour of its own among several, and where it and its ghost are."""
     model, path = read_model(run.model), f"{prefix}robot"
     items = model.items(set(motion.angles), path)
     if color is not None:
@@ -209,7 +212,6 @@ def _robot(
         items = [_painted(item, color) if item.frame == root and item.name == "box" else item for item in items]
     tracks = model.tracks(motion.X_WB, motion.angles, path)
     items.append(marks.heading(robot, f"{path}/{model.root}", color or palette.SIMULATED))
-    items += marks.ghost(robot, f"{prefix}ghost")
     return items, {**tracks, f"{prefix}ghost": motion.X_WR}
 
 
@@ -223,12 +225,18 @@ def _extras(run: SeenRun, robot: Robot, motion: Motion, prefix: str) -> list[tup
     return found
 
 
-def _trails(run: SeenRun, robot: Robot, prefix: str, color: Color) -> list[Item]:
-    size, label = marks.size_of(robot), prefix.rstrip("/")
-    reference = marks.trail(
-        run.recording.reference_q_xyt[:, :2], "reference", palette.REFERENCE, size, f"{label}reference"
+def _trail(q_xyt: Array, layer: str, color: Color, robot: Robot, prefix: str) -> list[Item]:
+    return marks.trail(q_xyt[:, :2], layer, color, marks.size_of(robot), f"{prefix.replace('/', '_')}{layer}")
+
+
+def _same_reference(run: SeenRun, other: SeenRun) -> bool:
+    """Whether the equations predict the same of both, so that one ghost does."""
+    mine, theirs = run.recording, other.recording
+    return (
+        mine.metadata["robot"] == theirs.metadata["robot"]
+        and np.array_equal(mine.time, theirs.time)
+        and np.allclose(mine.reference_q_xyt, theirs.reference_q_xyt, rtol=0, atol=1e-9)
     )
-    return reference + marks.trail(run.recording.q_xyt[:, :2], "simulated", color, size, f"{label}simulated")
 
 
 def _surroundings(runs: Sequence[SeenRun]) -> list[Item]:
