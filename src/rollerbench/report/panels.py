@@ -66,7 +66,7 @@ def kept(values: Array, most: int = POINTS_OF_CURVE) -> NDArray[np.intp]:
     n, k = columns.shape
     if n <= most:
         return np.arange(n)
-    missing: NDArray[np.bool_] = np.isnan(columns)
+    missing = np.isnan(columns)
     wanted = 2 * k + bool(missing.any())
     stretches = max(1, (most - 2) // wanted)
     starts = np.linspace(0, n, stretches + 1).astype(int)[:-1]
@@ -78,7 +78,7 @@ def kept(values: Array, most: int = POINTS_OF_CURVE) -> NDArray[np.intp]:
         low, high = np.where(gap, np.inf, column)[rows], np.where(gap, -np.inf, column)[rows]
         found += [starts + low.argmin(axis=1), starts + high.argmax(axis=1)]
     if missing.any():
-        gaps = missing.any(axis=1)[rows]
+        gaps = np.isnan(columns.sum(axis=1))[rows]
         found.append((starts + gaps.argmax(axis=1))[gaps.any(axis=1)])
     return np.unique(np.minimum(np.concatenate(found), n - 1))
 

@@ -34,9 +34,7 @@ def sections(run: StoredRun) -> dict[str, list[tuple[str, str, bool]]]:
     found: dict[str, list[tuple[str, str, bool]]] = {MAIN: []}
     for name, value in settings(run).items():
         section, _, field = name.partition(".") if "." in name else (MAIN, "", name)
-        # A mapping that is not empty is in one piece where a whole was set.
-        marked = name in changed or any(name.startswith(f"{whole}.") for whole in changed)
-        found.setdefault(section, []).append((field, value, marked))
+        found.setdefault(section, []).append((field, value, name in changed))
     return found
 
 

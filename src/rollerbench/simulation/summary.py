@@ -13,6 +13,7 @@ from rollerbench.recording import Recording
 from rollerbench.report.parameters import flat
 from rollerbench.simulation.log import Simulated, versions
 from rollerbench.simulation.scenario import Scenario
+from rollerbench.simulation.settings import OpenLoop
 
 Array = NDArray[np.float64]
 
@@ -53,7 +54,10 @@ def summarize(
 def changed_settings(scenario: Scenario) -> list[str]:
     """Dotted names of the scenario's fields that differ from their defaults."""
     own = {"name", "summary", "robot"}
-    return list(flat(scenario.model_dump(mode="json", exclude=own, exclude_defaults=True)))
+    changed = flat(scenario.model_dump(mode="json", exclude=own, exclude_defaults=True))
+    # Each type of controller counts its own type as a default.
+    kind = ["controller.type"] if scenario.controller.type != OpenLoop().type else []
+    return [*(name for name, value in changed.items() if value != {}), *kind]
 
 
 def cross_check(second: Simulated, recording: Recording) -> dict[str, Any]:
