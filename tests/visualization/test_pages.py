@@ -46,15 +46,3 @@ def test_the_recording_shows_robot_and_ground_without_a_request_and_moves(folder
     assert ground.std() > 0.005  # grid lines
     assert len(np.unique((start * 16).astype(int).reshape(-1, 3), axis=0)) > 20
     assert np.abs(start - end).max() > 0.2
-
-
-def test_the_report_reads_on_phone_and_desk(folder: Path) -> None:
-    with opened(folder / "report.html") as watched:
-        for width in (360, 1000):
-            watched.page.set_viewport_size({"width": width, "height": 600})
-            assert watched.page.locator("figure svg").count() == 5
-            assert "Position error" in watched.page.inner_text("body")
-            overflow = watched.page.evaluate("document.documentElement.scrollWidth - window.innerWidth")
-            assert overflow <= 0
-        assert watched.requests == []
-        assert watched.errors == []

@@ -30,6 +30,6 @@ def inline_svg(svg: str, name: str, label: str) -> Markup:
     """
     text = re.sub(r"<metadata>.*?</metadata>", "", svg[svg.index("<svg") :], count=1, flags=re.DOTALL)
     used = set(re.findall(REFERENCE, text))
-    text = re.sub(r' id="([\w-]+)"', lambda found: f' id="{name}-{found[1]}"' if found[1] in used else "", text)
+    text = re.sub(r' id="([^"]+)"', lambda found: f' id="{name}-{found[1]}"' if found[1] in used else "", text)
     text = re.sub(REFERENCE, lambda found: found[0].replace("#", f"#{name}-"), text)
     return Markup(text.replace("<svg ", Markup('<svg role="img" aria-label="{}" ').format(label), 1))

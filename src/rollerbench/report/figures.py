@@ -41,10 +41,15 @@ def run_figures(recording: Recording) -> dict[str, str]:
 
 def alike_figures(recordings: Sequence[Recording]) -> list[dict[str, str]]:
     """SVG texts of the figures of several runs, those of one name with the same scales."""
+    return [{name: panels_text(*drawn) for name, drawn in run.items()} for run in drawn_alike(recordings)]
+
+
+def drawn_alike(recordings: Sequence[Recording]) -> list[dict[str, Drawn]]:
+    """The figures of several runs by name, those of one name with the same scales."""
     runs = [drawn_run(recording) for recording in recordings]
     for name in dict.fromkeys(name for run in runs for name in run):
         _same_scales([run[name][1] for run in runs if name in run])
-    return [{name: panels_text(*drawn) for name, drawn in run.items()} for run in runs]
+    return runs
 
 
 def drawn_run(recording: Recording) -> dict[str, Drawn]:

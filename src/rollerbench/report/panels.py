@@ -28,7 +28,7 @@ TITLE, FOOT, GAP, LINE, RIGHT = 0.24, 0.42, 0.12, 0.19, 0.12
 STEPS = (1, 2, 2.5, 5, 10)
 """Of numbers at the axes."""
 
-POINTS_OF_CURVE, POINTS_OF_FIGURE = 1500, 9000
+POINTS_OF_CURVE, POINTS_OF_FIGURE = 1500, 6500
 """Most points of a curve, and of all curves of a figure, that are drawn."""
 
 

@@ -47,8 +47,9 @@ def differences(runs: Sequence[StoredRun]) -> list[tuple[str, list[str]]]:
     names = dict.fromkeys(name for table in tables for name in table)
     # An empty mapping says no more than that what others hold in it is missing.
     wholes = {name[: place.start()] for name in names for place in re.finditer(r"\.", name)}
-    names = dict.fromkeys(name for name in names if name not in wholes)
-    rows = [(name, [table.get(name, "-") for table in tables]) for name in names]
+    tops = list(dict.fromkeys(name.partition(".")[0] for name in names))
+    kept = sorted((name for name in names if name not in wholes), key=lambda name: tops.index(name.partition(".")[0]))
+    rows = [(name, [table.get(name, "-") for table in tables]) for name in kept]
     return [(name, values) for name, values in rows if len(set(values)) > 1]
 
 
