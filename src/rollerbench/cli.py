@@ -212,6 +212,33 @@ def replay(
         serve_page(shown.page(), host=host, port=port, ready=ready)
 
 
+@app.command(epilog="Example: rollerbench report runs/a runs/b -o comparison.html")
+def report(
+    runs: Annotated[list[Path], typer.Argument(help="Run folders, or files in them such as recording.parquet.")],
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output", "-o", help="File to write.", show_default="RUN/report.html; comparison.html of several"
+        ),
+    ] = None,
+) -> None:
+    """Write the report of a run again, or of several side by side; nothing is simulated."""
+    from rollerbench.description.files import write_atomically
+    from rollerbench.report.page import report_page
+    from rollerbench.report.stored_run import StoredRun, run_folder
+
+    stored = [StoredRun.read(run) for run in runs]
+    target = output or (run_folder(runs[0]) / "report.html" if len(runs) == 1 else Path("comparison.html"))
+    if target.is_dir():
+        raise RollerbenchError(f"{target}: is a folder; accepted: a file to write, such as comparison.html")
+    text = report_page(stored)
+    try:
+        write_atomically(target, text)
+    except OSError as error:
+        raise RollerbenchError(f"{target}: cannot be written: {error}") from error
+    _print(f"Written: {target}")
+
+
 @app.command(epilog="Example: rollerbench build youbot_base")
 def build(
     robots: Annotated[

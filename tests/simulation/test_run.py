@@ -46,6 +46,7 @@ def test_the_folder_is_complete(folder: Path) -> None:
         "figures/trajectory.svg",
         "figures/pose_error.svg",
         "figures/wheel_speeds.svg",
+        "figures/wheel_efforts.svg",
         "figures/wheel_slip.svg",
         "figures/error_budget.svg",
     }

@@ -110,15 +110,3 @@ def test_ghost_and_robot_are_apart_when_errors_are_injected_and_coincide_when_no
     assert (apart > 0.04) == (gear_error != 0)
     assert changed.sum() > 2000
     assert (over_ground.sum() > 0.3 * changed.sum()) == (gear_error != 0), over_ground.sum() / changed.sum()
-
-
-def test_the_report_reads_on_phone_and_desk(folder: Path) -> None:
-    with opened(folder / "report.html") as watched:
-        for width in (360, 1000):
-            watched.page.set_viewport_size({"width": width, "height": 600})
-            assert watched.page.locator("figure svg").count() == 5
-            assert "Position error" in watched.page.inner_text("body")
-            overflow = watched.page.evaluate("document.documentElement.scrollWidth - window.innerWidth")
-            assert overflow <= 0
-        assert watched.requests == []
-        assert watched.errors == []

@@ -1,1 +1,5 @@
-"""Figures, pages and tables of runs."""
+"""Figures, pages and tables of runs; matplotlib is loaded when something is drawn."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

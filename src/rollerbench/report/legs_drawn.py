@@ -1,16 +1,17 @@
-"""Figures of a run of a robot on legs as SVG."""
-
-from itertools import cycle
+"""Figures of a run of a robot on legs ."""
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from rollerbench.recording import Recording
-from rollerbench.report.drawing import COLORS, STYLES, new_figure, svg_text
+from rollerbench.report.panels import Look, at_least, looks, new_panels, plot
+
+DESIRED = Look(color="#000000", style="--")
 
 
-def leg_figures(recording: Recording) -> dict[str, str]:
-    """SVG texts of the figures that only robots on legs have, by name."""
+def leg_figures(recording: Recording) -> dict[str, tuple[Figure, list[Axes]]]:
+    """The figures that only robots on legs have, and their panels, by name."""
     return {
         "body": body(recording),
         "gait": gait(recording),
@@ -19,76 +20,58 @@ def leg_figures(recording: Recording) -> dict[str, str]:
     }
 
 
-def body(recording: Recording) -> str:
+def body(recording: Recording) -> tuple[Figure, list[Axes]]:
     """Height and inclination of the body over time, as they are and as they should be."""
-    figure, (height, tilt) = new_figure(2)
-    columns, time = recording.columns, recording.time
-    height.plot(time, 1e3 * columns["z"], color=COLORS[0], label="simulated")
-    height.plot(time, 1e3 * columns["desired_z"], "--", color="0.2", linewidth=1, label="desired")
-    height.set_ylabel("height [mm]")
-    for (name, color), style in zip((("roll", COLORS[1]), ("pitch", COLORS[2])), STYLES, strict=False):
-        tilt.plot(time, np.degrees(columns[name]), style, color=color, label=name)
-        tilt.plot(time, np.degrees(columns[f"desired_{name}"]), "--", color="0.2", linewidth=0.8)
-    tilt.set_ylabel("inclination [deg] (dashed: desired)")
-    tilt.set_xlabel("time [s]")
-    for axes in (height, tilt):
-        axes.legend()
-    _no_noise(height, 1.0)
-    _no_noise(tilt, 0.1)
-    return svg_text(figure)
+    labels = ("height of the body [mm]", "roll [deg]", "pitch [deg]")
+    figure, panels = new_panels(labels, "time [s]", height=1.2)
+    simulated = next(looks())
+    for axes, name, scale, span in zip(panels, ("z", "roll", "pitch"), (1e3, *[np.degrees(1.0)] * 2), (1.0, 0.1, 0.1),
+                                       strict=True):  # fmt: skip
+        plot(axes, recording.time, scale * recording.columns[name], simulated, "simulated", curves=6)
+        desired = scale * recording.columns[f"desired_{name}"]
+        plot(axes, recording.time, desired, DESIRED, "desired", curves=6, width=1.0)
+        at_least(axes, span)
+    return figure, panels
 
 
-def gait(recording: Recording) -> str:
-    """Bars of the times in which each foot stands; below, what the feet bear."""
-    figure, (bars, loads) = new_figure(2)
+def gait(recording: Recording) -> tuple[Figure, list[Axes]]:
+    """Bars of the times in which each foot stands, and what the feet bear."""
     legs, time = recording.metadata["legs"], recording.time
-    for row, (leg, color) in enumerate(zip(legs, cycle(COLORS), strict=False)):
-        stands = recording.columns[f"{leg}.stance"] > 0
-        bars.fill_between(time, row - 0.4, row + 0.4, where=list(stands), color=color, linewidth=0)
-        loads.plot(time, recording.columns[f"{leg}.load"], color=color, linewidth=0.8, label=leg)
+    figure, panels = new_panels(["foot that stands [-]", "load [N]"], "time [s]", height=1.5)
+    bars, loads = panels
+    for row, (leg, look) in enumerate(zip(legs, looks(), strict=False)):
+        stands = np.concatenate([[0.0], recording.columns[f"{leg}.stance"] > 0, [0.0]])
+        starts, ends = np.flatnonzero(np.diff(stands) > 0), np.flatnonzero(np.diff(stands) < 0) - 1
+        spans = list(zip(time[starts], time[ends] - time[starts], strict=True))
+        bars.broken_barh(spans, (row - 0.4, 0.8), color=look.color, linewidth=0)
+        plot(loads, time, recording.columns[f"{leg}.load"], look, leg, curves=len(legs), width=0.8)
     bars.set_yticks(range(len(legs)), legs)
-    bars.invert_yaxis()
-    bars.set_xlim(time[0], time[-1] if len(time) > 1 else time[0] + 1)
-    loads.set_xlim(bars.get_xlim())
-    loads.set_ylabel("load [N]")
-    loads.set_xlabel("time [s]")
-    loads.legend(ncols=2)
-    return svg_text(figure)
+    bars.set_ylim(len(legs) - 0.5, -0.5)
+    return figure, panels
 
 
-def feet(recording: Recording) -> str:
+def feet(recording: Recording) -> tuple[Figure, list[Axes]]:
     """Heights of the feet, and how fast those on the ground slide."""
-    figure, (height, slip) = new_figure(2)
-    columns, time = recording.columns, recording.time
-    for leg, color in zip(recording.metadata["legs"], cycle(COLORS), strict=False):
-        height.plot(time, 1e3 * columns[f"{leg}.foot_z"], color=color, linewidth=1, label=leg)
+    figure, panels = new_panels(["height of the foot [mm]", "slip while it stands [mm/s]"], "time [s]", height=1.5)
+    columns, legs = recording.columns, recording.metadata["legs"]
+    for leg, look in zip(legs, looks(), strict=False):
         speed = 1e3 * np.hypot(columns[f"{leg}.slip_x"], columns[f"{leg}.slip_y"])
-        slip.plot(time, np.where(columns[f"{leg}.stance"] > 0.5, speed, np.nan), color=color, linewidth=0.8)
-    height.set_ylabel("foot height [mm]")
-    height.legend(ncols=2)
-    slip.set_ylabel("slip in stance [mm/s]")
-    slip.set_xlabel("time [s]")
-    _no_noise(height, 1.0)
-    return svg_text(figure)
+        slip = np.where(columns[f"{leg}.stance"] > 0.5, speed, np.nan)
+        plot(panels[0], recording.time, 1e3 * columns[f"{leg}.foot_z"], look, leg, curves=2 * len(legs), width=1.0)
+        plot(panels[1], recording.time, slip, look, curves=2 * len(legs), width=0.8)
+    at_least(panels[0], 1.0)
+    at_least(panels[1], 1e-2)
+    return figure, panels
 
 
-def joint_efforts(recording: Recording) -> str:
-    """The largest torque of each joint over all legs, joint by joint."""
-    figure, (axes,) = new_figure(1)
+def joint_efforts(recording: Recording) -> tuple[Figure, list[Axes]]:
+    """The largest torque of each joint and of the wheels over all legs."""
+    figure, panels = new_panels(["largest torque of all legs [N m]"], "time [s]")
     columns = recording.columns
     numbers = sorted({name.rpartition("_")[2] for name in columns if ".effort_" in name}, key=int)
-    for number, color, style in zip(numbers, cycle(COLORS), cycle(STYLES), strict=False):
-        efforts = [np.abs(values) for name, values in columns.items() if name.endswith(f".effort_{number}")]
-        axes.plot(recording.time, np.max(efforts, axis=0), style, color=color, linewidth=1, label=f"joint {number}")
-    axes.set_ylabel("largest torque of all legs [N m]")
-    axes.set_xlabel("time [s]")
-    axes.legend()
-    return svg_text(figure)
-
-
-def _no_noise(axes: Axes, span: float) -> None:
-    """Shows at least a span of values: numerical noise shall look like none."""
-    low, high = axes.get_ylim()
-    if high - low < span:
-        middle = 0.5 * (low + high)
-        axes.set_ylim(middle - 0.5 * span, middle + 0.5 * span)
+    parts = {f"joint {number}": f".effort_{number}" for number in numbers} | {"wheel": ".wheel_effort"}
+    for (label, ending), look in zip(parts.items(), looks(), strict=False):
+        efforts = [np.abs(values) for name, values in columns.items() if name.endswith(ending)]
+        plot(panels[0], recording.time, np.max(efforts, axis=0), look, label, curves=len(parts), width=1.0)
+    at_least(panels[0], 1e-3)
+    return figure, panels

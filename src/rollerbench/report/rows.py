@@ -69,15 +69,15 @@ def _cross_check_rows(second: Mapping[str, Any]) -> list[Row]:
 
 
 def _mm(metres: float) -> str:
-    return f"{1e3 * metres:.3f} mm"
+    return f"{1e3 * metres:z.3f} mm"
 
 
 def _degrees(radians: float) -> str:
-    return f"{math.degrees(radians):.4f} deg"
+    return f"{math.degrees(radians):z.4f} deg"
 
 
 def _pose(pose: list[float]) -> str:
-    return f"x {pose[0]:.4f} m, y {pose[1]:.4f} m, yaw {_degrees(pose[2])}"
+    return f"x {pose[0]:z.4f} m, y {pose[1]:z.4f} m, yaw {_degrees(pose[2])}"
 
 
 def _percent(percent: float | None) -> str:

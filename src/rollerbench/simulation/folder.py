@@ -11,7 +11,8 @@ from rollerbench.description.files import to_yaml
 from rollerbench.errors import ResourceError
 from rollerbench.recording import Recording
 from rollerbench.report.figures import run_figures
-from rollerbench.report.page import run_page
+from rollerbench.report.page import report_page
+from rollerbench.report.stored_run import StoredRun
 from rollerbench.simulation.log import Simulated
 from rollerbench.simulation.picture import diagram_svg
 from rollerbench.simulation.scenario import Scenario
@@ -67,7 +68,7 @@ def write_folder(
             "robot.yaml": to_yaml(scenario.robot),
             "model.sdf": model,
             "summary.json": json.dumps(summary, indent=2, allow_nan=False) + "\n",
-            "report.html": run_page(summary, figures, has_recording=page is not None),
+            "report.html": report_page([_stored(folder.name, scenario, recording, summary, page)], figures=[figures]),
             "recording.html": page,
             "diagram.svg": diagram_svg(scenario) if scenario.recording.diagram else None,
         }
@@ -90,7 +91,25 @@ def write_folder(
         raise
 
 
+def _stored(
+    name: str, scenario: Scenario, recording: Recording, summary: Mapping[str, Any], page: str | None
+) -> StoredRun:
+    """The run as its folder will hold it."""
+    return StoredRun(
+        name=name,
+        summary=summary,
+        recording=recording,
+        scenario=_fields(scenario),
+        robot=scenario.robot,
+        page=None if page is None else page.encode(),
+    )
+
+
 def _resolved(scenario: Scenario) -> str:
     """The scenario with all its defaults, its robot as the robot.yaml beside it."""
+    return to_yaml(_fields(scenario))
+
+
+def _fields(scenario: Scenario) -> dict[str, Any]:
     data = scenario.model_dump(mode="json", exclude={"robot"})
-    return to_yaml({"name": data.pop("name"), "summary": data.pop("summary"), "robot": "robot.yaml", **data})
+    return {"name": data.pop("name"), "summary": data.pop("summary"), "robot": "robot.yaml", **data}

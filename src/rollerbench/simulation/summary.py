@@ -10,8 +10,10 @@ from rollerbench.analysis import error_budget, height_ripple, leg_metrics, pose_
 from rollerbench.analysis.pose_error import last_direction, path_length, rotation
 from rollerbench.kinematics.odometry import rotate
 from rollerbench.recording import Recording
+from rollerbench.report.parameters import flat
 from rollerbench.simulation.log import Simulated, versions
 from rollerbench.simulation.scenario import Scenario
+from rollerbench.simulation.settings import OpenLoop
 
 Array = NDArray[np.float64]
 
@@ -35,6 +37,7 @@ def summarize(
         "status": "ok" if simulated.failure is None else "failed",
         "failure": simulated.failure,
         "seed": scenario.seed,
+        "changed_settings": changed_settings(scenario),
         "versions": versions(),
         "duration": duration,
         "wall_time": simulated.wall_time,
@@ -46,6 +49,15 @@ def summarize(
         **({"legs": leg_figures(scenario, recording)} if scenario.robot.legs else {}),
         "cross_check": second,
     }
+
+
+def changed_settings(scenario: Scenario) -> list[str]:
+    """Dotted names of the scenario's fields that differ from their defaults."""
+    own = {"name", "summary", "robot"}
+    changed = flat(scenario.model_dump(mode="json", exclude=own, exclude_defaults=True))
+    # Each type of controller counts its own type as a default.
+    kind = ["controller.type"] if scenario.controller.type != OpenLoop().type else []
+    return [*(name for name, value in changed.items() if value != {}), *kind]
 
 
 def cross_check(second: Simulated, recording: Recording) -> dict[str, Any]:
