@@ -20,6 +20,7 @@ from rollerbench.simulation.scenario import Scenario
 RUN_FILES = {
     *("scenario.yaml", "robot.yaml", "model.sdf", "recording.parquet", "summary.json"),
     *("recording.html", "report.html", "figures", "cross_check.parquet", "diagram.svg"),
+    *("preview.png", "recording.mp4", "recording.gif"),
 }
 """Everything that a run writes, and so may replace."""
 

@@ -206,10 +206,14 @@ class RecordingSettings(Part):
 
     Attributes:
         html: Whether to write the self-contained Meshcat page recording.html.
-        frames_per_second: Frames of that page [1/s].
+        frames_per_second: Frames of that page, and of a video [1/s].
+        preview: Whether to draw a picture of the end as preview.png, beside recording.html.
+        video: Whether to write a video, as recording.mp4 (with the extra `video`) or recording.gif; None for none.
         diagram: Whether to draw the simulated diagram as diagram.svg.
     """
 
     html: Flag = True
     frames_per_second: Annotated[Positive, Field(le=200)] = 30.0
+    preview: Flag = True
+    video: Literal["mp4", "gif"] | None = None
     diagram: Flag = False

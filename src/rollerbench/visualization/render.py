@@ -29,7 +29,7 @@ MARGIN = 0.05
 """Share of a picture that stays free along each edge."""
 
 GIF_SIZE = (640, 360)
-MP4_SIZE = (1280, 720)
+MP4_SIZE = (960, 540)
 
 GIF_PERIOD = 0.08
 """Least time between frames of a GIF [s]; its clock counts hundredths of a second."""
@@ -96,8 +96,8 @@ def video(
     Args:
         scene: What to show.
         path: File to write; its ending says whether as mp4 (H.264) or as gif.
-        width: Of the picture [pixel]; by default 1280, of a gif 640. For mp4 odd ones lose a pixel.
-        height: Of the picture [pixel]; by default 720, of a gif 360.
+        width: Of the picture [pixel]; by default 960, of a gif 640. For mp4 odd ones lose a pixel.
+        height: Of the picture [pixel]; by default 540, of a gif 360.
         frames_per_second: Frames [1/s]; of a gif 12.5 at most.
         view: From where; by default as the scene starts.
         progress: Called with the time of each frame [s].
