@@ -18,7 +18,7 @@ NEIGHBOURHOOD = 2.2
 
 
 def axes(direction: Array) -> Array:
-    """Rotation (3, 3) of a camera in W, its x axis to the right, y down, z ahead, that looks against a direction (3,)."""
+    """Rotation (3, 3) in W of a camera that looks against a direction (3,): x to the right, y down, z ahead."""
     right = np.cross([0.0, 0.0, 1.0], direction)
     right /= np.linalg.norm(right)
     return np.column_stack([right, np.cross(right, direction), -direction])

@@ -159,7 +159,9 @@ class _Film:
             position, yaw = pose_error(self.scene, run.prefix, time)
             color = tuple(round(255 * value) for value in run.color)
             place = (left, top + index * line)
-            draw.rectangle((place[0], place[1] + 0.15 * line, place[0] + 0.3 * line, place[1] + 0.65 * line), fill=color)
+            draw.rectangle(
+                (place[0], place[1] + 0.15 * line, place[0] + 0.3 * line, place[1] + 0.65 * line), fill=color
+            )
             text = f"{run.name}   {time:5.2f} s   {1e3 * position:.1f} mm, {math.degrees(yaw):+.2f}° off"
             draw.text((place[0] + 0.7 * line, place[1]), text, fill=(40, 45, 52), font=self._font)
 
