@@ -80,6 +80,10 @@ def run(
     no_recording: Annotated[
         bool, typer.Option("--no-recording", help="Write no recording.html, which is faster.")
     ] = False,
+    video: Annotated[
+        str | None,
+        typer.Option(help="Write a video too: mp4, or gif. No display or GPU is needed.", show_default="none"),
+    ] = None,
     diagram: Annotated[
         bool, typer.Option("--diagram", help="Draw the simulated diagram, its systems and ports, as diagram.svg.")
     ] = False,
@@ -92,6 +96,7 @@ def run(
     overrides += [f"engine={engine}"] if engine is not None else []
     overrides += ["check_step=true"] if check_step else []
     overrides += ["recording.html=false"] if no_recording else []
+    overrides += [f"recording.video={video}"] if video is not None else []
     overrides += ["recording.diagram=true"] if diagram else []
     overrides += ["simulator.target_realtime_rate=1.0"] if live else []
     loaded = simulation.load_scenario(scenario, overrides=overrides, robot=robot)

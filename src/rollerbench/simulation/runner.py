@@ -16,8 +16,8 @@ from rollerbench.simulation.folder import check_folder, write_folder
 from rollerbench.simulation.log import Progress, Simulated
 from rollerbench.simulation.scenario import Scenario, load_scenario
 from rollerbench.simulation.summary import apart, cross_check, summarize
-from rollerbench.visualization.page import scene_page
-from rollerbench.visualization.scenes import SeenRun, scene_of
+from rollerbench.visualization import render
+from rollerbench.visualization.scenes import Scene, SeenRun, scene_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,6 +71,8 @@ def run(
         check_folder(folder)
         if scenario.recording.diagram:
             picture.check()
+        if scenario.recording.video is not None:
+            render.check(scenario.recording.video)
     if scenario.engine != "drake":
         mujoco_engine.check(scenario)
     _warn_about_step(scenario)
@@ -97,7 +99,8 @@ def run(
     )
     if folder is not None:
         model = robot_to_sdf(scenario.simulated_robot)
-        write_folder(folder, scenario, recording, summary, model, _page(scenario, recording, summary, model), second)
+        scene = _scene(scenario, recording, summary, model)
+        write_folder(folder, scenario, recording, summary, model, scene, second, progress=progress)
     result = RunResult(
         scenario=scenario,
         recording=recording,
@@ -118,14 +121,14 @@ def _simulated(scenario: Scenario, meshcat: Meshcat | None = None, progress: Pro
     return drake_engine.simulate(scenario, meshcat=meshcat, progress=progress)
 
 
-def _page(scenario: Scenario, recording: Recording, summary: Mapping[str, Any], model: str) -> str | None:
-    """The text of recording.html; None if there shall be none."""
+def _scene(scenario: Scenario, recording: Recording, summary: Mapping[str, Any], model: str) -> Scene | None:
+    """What pages, pictures and videos show; None if there shall be none."""
     settings = scenario.recording
-    if not settings.html:
+    if not settings.html and settings.video is None:
         return None
     run = SeenRun(name=scenario.name, recording=recording, model=model, summary=summary)
     marks = {"forces": settings.forces, "slip": settings.slip}
-    return scene_page(scene_of([run], view=settings.camera, frames_per_second=settings.frames_per_second, **marks))
+    return scene_of([run], view=settings.camera, frames_per_second=settings.frames_per_second, **marks)
 
 
 def _at_half_step(scenario: Scenario) -> Scenario:

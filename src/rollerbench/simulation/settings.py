@@ -206,10 +206,12 @@ class RecordingSettings(Part):
 
     Attributes:
         html: Whether to write the self-contained Meshcat page recording.html.
-        frames_per_second: Frames of that page [1/s].
+        frames_per_second: Frames of that page, and of a video [1/s].
         camera: Where it looks from: "iso", at the whole path from aside; "top", from above; "follow", at the robot.
         forces: Whether to record the forces of the ground on the wheels, and to show them.
         slip: Whether to show where wheels slid.
+        preview: Whether to draw a picture of the end as preview.png, where there is a page or a video.
+        video: Whether to write a video, as recording.mp4 (with the extra `video`) or recording.gif; None for none.
         diagram: Whether to draw the simulated diagram as diagram.svg.
     """
 
@@ -218,4 +220,6 @@ class RecordingSettings(Part):
     camera: Literal["iso", "top", "follow"] = "iso"
     forces: Flag = False
     slip: Flag = False
+    preview: Flag = True
+    video: Literal["mp4", "gif"] | None = None
     diagram: Flag = False

@@ -1,5 +1,6 @@
 """Shapes of scenes as Drake's."""
 
+import numpy as np
 from pydrake import geometry
 from pydrake.common import MemoryFile
 
@@ -19,7 +20,12 @@ def drake_shape(shape: Shape) -> geometry.Shape:
 
 
 def _wavefront(mesh: Mesh) -> bytes:
-    """Triangles as a Wavefront OBJ file; its corners count from 1."""
+    """Triangles as a Wavefront OBJ file, each with its normal; its corners count from 1."""
+    corners = mesh.vertices[mesh.faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
     lines = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in mesh.vertices.tolist()]
-    lines += [f"f {a} {b} {c}" for a, b, c in (mesh.faces + 1).tolist()]
+    lines += [f"vn {x:.6g} {y:.6g} {z:.6g}" for x, y, z in normals.tolist()]
+    faces = enumerate((mesh.faces + 1).tolist(), start=1)
+    lines += [f"f {a}//{normal} {b}//{normal} {c}//{normal}" for normal, (a, b, c) in faces]
     return "\n".join(lines).encode("ascii")

@@ -100,6 +100,12 @@ class Scene:
     pitch: float
 
     @property
+    def shown_items(self) -> tuple[Item, ...]:
+        """What is seen at the start."""
+        hidden = {"forces", "slip"} - self.shown
+        return tuple(item for item in self.items if hidden.isdisjoint(item.frame.split("/")))
+
+    @property
     def duration(self) -> float:
         """Last time [s]."""
         return max(float(times[-1]) for times in self.times.values())
