@@ -161,9 +161,11 @@ class Channel(WebSocketHandler):
     def send(self, text: str) -> None:
         """Sends a text, if anybody is still there."""
         try:
-            self.write_message(text)
+            sent = asyncio.ensure_future(self.write_message(text))
         except WebSocketClosedError:
-            self._server.clients.pop(self._number, None)
+            return
+        # A page that goes away meanwhile is no error; looking at it keeps asyncio from reporting one.
+        sent.add_done_callback(lambda future: future.cancelled() or future.exception())
 
     def data_received(self, chunk: bytes) -> None:
         """Tornado reads the socket by itself."""

@@ -129,7 +129,7 @@ class Teleop:
         meshcat = local_meshcat("*" if self._host in EVERYWHERE else self._host)
         legs = bool(self._scenario.robot.legs)
         session: Session = (LegSession if legs else WheelSession)(self._scenario, meshcat)
-        scene = LiveScene(meshcat, session.robot)
+        scene = LiveScene(meshcat, session.robot, camera="follow")
         desk = Desk(self._timeout)
         hello = {
             "robot": session.robot.name,

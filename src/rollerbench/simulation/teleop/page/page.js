@@ -120,7 +120,7 @@ function build() {
   document.title = `${hello.robot} · rollerbench teleop`;
   byId("scene").src = `http://${location.hostname}:${hello.meshcat_port}/`;
   panels = {
-    twist: twistPanel(hello.axes, () => { if (mode !== "twist" && panels.wheels) mode = "twist"; touch("twist"); }),
+    twist: twistPanel(hello.axes, () => touch("twist")),
     wheels: hello.wheels ? wheelPanel(hello, () => touch("wheels")) : null,
     legs: hello.legs ? legPanel(hello, (kind, value) => { choice = { ...choice, [kind]: value }; touch("twist"); },
       () => touch("twist")) : null,

@@ -52,11 +52,14 @@ export function twistPanel(axes, moved) {
   };
 }
 
+/** Adds a table; heads are texts, or a text and over how many columns it stands. Returns what adds a row. */
 function table(parent, caption, heads) {
   const body = make("tbody");
-  parent.append(make("table", {},
-    make("caption", {}, caption),
-    make("thead", {}, make("tr", {}, ...heads.map((head) => make("th", { scope: "col" }, head)))), body));
+  const cells = heads.map((head) => {
+    const [text, span] = [head].flat();
+    return make("th", { scope: "col", colspan: span, class: text }, text);
+  });
+  parent.append(make("table", {}, make("caption", {}, caption), make("thead", {}, make("tr", {}, ...cells)), body));
   return (name, ...cells) => {
     const row = make("tr", {}, make("th", { scope: "row" }, words(name)));
     const made = cells.map((cell) => make("td", { class: cell ? "" : "numbers" }, ...(cell ? [cell] : [])));
@@ -73,7 +76,7 @@ export function wheelPanel(hello, moved) {
   const wheels = {};
   const steering = {};
   const slips = {};
-  const add = table(parent, "Speeds [rad/s]; slip [mm/s]", ["wheel", "asked", "", "told", "turns", "slip"]);
+  const add = table(parent, "Speeds [rad/s]; slip [mm/s]", ["wheel", ["asked", 2], "told", "turns", "slip"]);
   for (const wheel of hello.wheels) {
     const input = slider(`${words(wheel.name)}, speed [rad/s]`, wheel.largest, moved);
     const [, ...cells] = add(wheel.name, input, "", "", "", "");
@@ -82,7 +85,7 @@ export function wheelPanel(hello, moved) {
   }
   for (const name of hello.passive) slips[name] = add(name, "", "", "", "", "")[4];
   if (hello.steered.length) {
-    const addSteered = table(parent, "Steering [deg]", ["wheel", "asked", "", "told", "looks"]);
+    const addSteered = table(parent, "Steering [deg]", ["wheel", ["asked", 2], "told", "looks"]);
     for (const name of hello.steered) {
       const input = slider(`${words(name)}, steering angle [deg]`, 180, moved);
       const [, ...cells] = addSteered(name, input, "", "", "");
@@ -145,7 +148,7 @@ export function legPanel(hello, chosen, moved) {
     const unit = axis.name === "height" ? "mm" : "deg";
     const input = slider(`body ${axis.name} [${unit}]`, axis.largest, moved);
     const number = make("output", { class: "numbers" });
-    parent.append(make("label", { class: "axis" }, make("span", {}, make("b", {}, axis.name), " of the body"), input, number,
+    parent.append(make("label", { class: "axis" }, make("span", {}, "body ", make("b", {}, axis.name)), input, number,
       make("span", { class: "unit" }, unit)));
     return { input, number };
   });
