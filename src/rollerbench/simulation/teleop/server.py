@@ -45,19 +45,19 @@ class Server:
         url: The page's address.
     """
 
-    def __init__(self, desk: Desk, hello: dict[str, Any], host: str, port: int) -> None:
+    def __init__(self, desk: Desk, host: str, port: int) -> None:
         """Opens the port; `start` serves.
 
         Args:
             desk: Where commands go.
-            hello: What a page is told first.
             host: Name or address to listen at.
             port: Port, 0 for any that is free.
 
         Raises:
             RollerbenchError: the port cannot be had.
         """
-        self.desk, self.hello = desk, hello
+        self.desk = desk
+        self.hello: dict[str, Any] = {}
         self.clients: dict[int, Channel] = {}
         self.numbers: Iterator[int] = itertools.count(1)
         try:
@@ -74,12 +74,18 @@ class Server:
         self._stopping = asyncio.Event()
         self._thread = threading.Thread(target=self._serve, name="teleop server", daemon=True)
 
-    def start(self) -> None:
-        """Begins to serve."""
+    def start(self, hello: dict[str, Any]) -> None:
+        """Begins to serve; pages are told this first."""
+        self.hello = hello
         self._thread.start()
 
     def stop(self) -> None:
         """Closes all connections, and the port."""
+        if not self._thread.is_alive():
+            for socket in self._sockets:
+                socket.close()
+            self._loop.close()
+            return
         self._loop.call_soon_threadsafe(self._stopping.set)
         self._thread.join()
 

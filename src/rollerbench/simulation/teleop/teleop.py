@@ -125,22 +125,23 @@ class Teleop:
             RollerbenchError: the port cannot be had, or Drake refuses a setting.
             SimulationError: the robot cannot stand.
         """
-        # Meshcat wants to be spoken to from the thread that made it.
-        meshcat = local_meshcat("*" if self._host in EVERYWHERE else self._host)
-        legs = bool(self._scenario.robot.legs)
-        session: Session = (LegSession if legs else WheelSession)(self._scenario, meshcat)
-        scene = LiveScene(meshcat, session.robot, camera="follow")
         desk = Desk(self._timeout)
-        hello = {
-            "robot": session.robot.name,
-            "summary": session.robot.summary,
-            "meshcat_port": meshcat.port(),
-            "timeout": self._timeout,
-            **session.hello(),
-        }
-        server = Server(desk, hello, self._host, self._port)
-        server.start()
+        server = Server(desk, self._host, self._port)
         try:
+            # Meshcat wants to be spoken to from the thread that made it.
+            meshcat = local_meshcat("*" if self._host in EVERYWHERE else self._host)
+            legs = bool(self._scenario.robot.legs)
+            session: Session = (LegSession if legs else WheelSession)(self._scenario, meshcat)
+            scene = LiveScene(meshcat, session.robot, camera="follow")
+            server.start(
+                {
+                    "robot": session.robot.name,
+                    "summary": session.robot.summary,
+                    "meshcat_port": meshcat.port(),
+                    "timeout": self._timeout,
+                    **session.hello(),
+                }
+            )
             self.url = server.url
             ready(server.url)
             self._ready.set()
