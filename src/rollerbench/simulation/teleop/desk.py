@@ -105,6 +105,4 @@ class Desk:
             actions, self._actions = tuple(self._actions), []
             age = now - self._heard
             late = self._driver is not None and age > self.timeout
-            return Order(
-                message=None if late else self._last, driver=self._driver, age=age, late=late, actions=actions
-            )
+            return Order(message=None if late else self._last, driver=self._driver, age=age, late=late, actions=actions)

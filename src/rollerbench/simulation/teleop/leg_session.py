@@ -41,7 +41,9 @@ class LegSession(Session):
         self._axes = leg_axes(scenario.robot)
         self._body = (-1e3 * BODY_SHARE * scenario.robot.ground_height, BODY_ANGLE, BODY_ANGLE)
         self._last = self._first = Message(touch=0, posture=posture)
-        super().__init__(scenario, LegStation(scenario, command="external", meshcat=meshcat, visuals=meshcat is not None))
+        super().__init__(
+            scenario, LegStation(scenario, command="external", meshcat=meshcat, visuals=meshcat is not None)
+        )
 
     @property
     def ghost_W(self) -> Array:
@@ -87,7 +89,11 @@ class LegSession(Session):
             "asked": {"posture": last.posture, "motion": last.motion, "gait": last.gait, "change": last.change},
             "body": list(last.body),
             "feet": {
-                leg.name: {"load": float(np.nan_to_num(load)), "slip": float(np.nan_to_num(slip)), "stands": bool(stands)}
+                leg.name: {
+                    "load": float(np.nan_to_num(load)),
+                    "slip": float(np.nan_to_num(slip)),
+                    "stands": bool(stands),
+                }
                 for leg, load, slip, stands in feet
             },
         }

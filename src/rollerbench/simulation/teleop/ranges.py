@@ -98,7 +98,9 @@ def wheel_ranges(kinematics: WheelKinematics) -> Ranges:
         axes=axes,
         wheel_speeds=np.where(fastest > 0, fastest, 2 * max(largest[:2]) / radii),
         wheel_accelerations=_acceleration(robot, max(largest[:2])) / radii,
-        steering_speeds=np.array([getattr(wheel, "max_steering_speed", None) or STEERING_SPEED for wheel in robot.steered_wheels]),
+        steering_speeds=np.array(
+            [getattr(wheel, "max_steering_speed", None) or STEERING_SPEED for wheel in robot.steered_wheels]
+        ),
     )
 
 
@@ -106,7 +108,8 @@ def leg_axes(robot: Robot) -> tuple[Axis, ...]:
     """Ranges of the twist of a robot on legs: half a body length per second, and as fast for the feet as it turns."""
     pace = 0.5 * max(robot.body.size[:2])
     return tuple(
-        Axis(name=name, largest=value) for name, value in zip(AXES, (pace, 0.75 * pace, pace / robot.reach), strict=True)
+        Axis(name=name, largest=value)
+        for name, value in zip(AXES, (pace, 0.75 * pace, pace / robot.reach), strict=True)
     )
 
 

@@ -182,9 +182,7 @@ class Teleop:
     def _remember(self, session: Session, order: Order, now: float) -> None:
         moves = order.message is not None and order.message.moves
         self.history.append(
-            Moment(
-                wall_time=now, age=order.age, driver=order.driver, moves=moves, largest_speed=session.largest_speed
-            )
+            Moment(wall_time=now, age=order.age, driver=order.driver, moves=moves, largest_speed=session.largest_speed)
         )
 
     def _tell(self, session: Session, order: Order, factor: float, server: Server) -> None:
