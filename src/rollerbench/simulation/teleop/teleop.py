@@ -23,6 +23,8 @@ from rollerbench.visualization.scene import local_meshcat
 FRAME_TIME, STATE_TIME = 1 / 30, 1 / 15
 """Times between two pictures, and between two states that pages are told [s]."""
 
+LARGEST_PORT = 65535
+
 LARGEST_LAG = 0.1
 """How much of the time that it lost the simulation makes up for [s]."""
 
@@ -79,6 +81,8 @@ class Teleop:
         """
         if isinstance(timeout, bool) or not (math.isfinite(timeout) and timeout > 0):
             raise RollerbenchError(f"--timeout {timeout}: accepted: a positive number of seconds")
+        if not 0 <= port <= LARGEST_PORT:
+            raise RollerbenchError(f"--port {port}: accepted: 0 (any that is free) to {LARGEST_PORT}")
         self._scenario = teleop_scenario(robot, overrides)
         self._host, self._port, self._timeout = host, port, timeout
         self._stop, self._ready = threading.Event(), threading.Event()
