@@ -9,7 +9,8 @@ import sys
 import time
 import urllib.error
 import urllib.request
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
 from typing import Any
 
 import pytest
@@ -27,6 +28,16 @@ PATIENCE = 20.0
 
 def socket_of(teleop: Teleop) -> str:
     return teleop.url.replace("http", "ws") + "socket"
+
+
+@asynccontextmanager
+async def connected(teleop: Teleop) -> AsyncIterator[WebSocketClientConnection]:
+    """A connection that is closed, and has heard so, at the end."""
+    channel = await websocket_connect(socket_of(teleop))
+    yield channel
+    channel.close()
+    while channel.close_code is None and await channel.read_message() is not None:
+        pass
 
 
 async def until(met: Callable[[], Any], channel: WebSocketClientConnection | None = None, **command: Any) -> None:
@@ -48,27 +59,27 @@ def test_silence_and_goodbye_stop_the_robot() -> None:
     with Teleop("kiwi", timeout=0.3) as teleop:
 
         async def drive() -> None:
-            channel = await websocket_connect(socket_of(teleop))
-            hello = json.loads(await channel.read_message())
-            assert hello["kind"] == "hello"
-            assert [wheel["name"] for wheel in hello["wheels"]] == ["front", "rear_left", "rear_right"]
-            ahead = {"touch": 1, "twist": [0.3, 0.0, 0.0]}
-            await until(lambda: teleop.state().get("pose", [0])[0] > 0.05, channel, **ahead)
-            assert abs(teleop.state()["pose"][1]) < 0.01
-            # Silence, the connection open.
-            await until(lambda: teleop.state()["late"])
-            await until(lambda: teleop.history[-1].largest_speed == 0.0)
-            assert teleop.state()["driver"] == hello["you"]
-            # It speaks again, and single wheels.
-            await until(lambda: teleop.history[-1].largest_speed > 1.0, channel, **ahead)
-            wheel = {"touch": 2, "mode": "wheels", "wheels": {"front": 5.0}}
-            await until(lambda: teleop.state()["wheels"]["front"]["told"] == 5.0, channel, **wheel)
-            told = [wheel["told"] for wheel in teleop.state()["wheels"].values()]
-            assert told == pytest.approx([5.0, 0.0, 0.0])
-            # Goodbye.
-            channel.close()
-            await until(lambda: teleop.history[-1].driver is None)
-            await until(lambda: teleop.history[-1].largest_speed == 0.0)
+            async with connected(teleop) as channel:
+                hello = json.loads(await channel.read_message())
+                assert hello["kind"] == "hello"
+                assert [wheel["name"] for wheel in hello["wheels"]] == ["front", "rear_left", "rear_right"]
+                ahead = {"touch": 1, "twist": [0.3, 0.0, 0.0]}
+                await until(lambda: teleop.state().get("pose", [0])[0] > 0.05, channel, **ahead)
+                assert abs(teleop.state()["pose"][1]) < 0.01
+                # Silence, the connection open.
+                await until(lambda: teleop.state()["late"])
+                await until(lambda: teleop.history[-1].largest_speed == 0.0)
+                assert teleop.state()["driver"] == hello["you"]
+                # It speaks again, and single wheels.
+                await until(lambda: teleop.history[-1].largest_speed > 1.0, channel, **ahead)
+                wheel = {"touch": 2, "mode": "wheels", "wheels": {"front": 5.0}}
+                await until(lambda: teleop.state()["wheels"]["front"]["told"] == 5.0, channel, **wheel)
+                told = [wheel["told"] for wheel in teleop.state()["wheels"].values()]
+                assert told == pytest.approx([5.0, 0.0, 0.0])
+                # Goodbye.
+                channel.close()
+                await until(lambda: teleop.history[-1].driver is None)
+                await until(lambda: teleop.history[-1].largest_speed == 0.0)
 
         asyncio.run(drive())
         assert any(moment.moves for moment in teleop.history)
@@ -76,20 +87,28 @@ def test_silence_and_goodbye_stop_the_robot() -> None:
         assert obeys_the_timeout(teleop, 0.3)
 
 
-def test_reset_brings_the_robot_back_also_after_a_fault() -> None:
-    # Next to no rollers are simulated, and it leans on them at once.
-    with Teleop("youbot_base", overrides=["plant.time_step=0.01"]) as teleop:
+def test_reset_brings_the_robot_back_also_after_a_fault(monkeypatch: pytest.MonkeyPatch) -> None:
+    found: list[str] = []
+    monkeypatch.setattr("rollerbench.simulation.teleop.wheel_session.fault", lambda *_: found[0] if found else None)
+    with Teleop("youbot_base") as teleop:
 
         async def drive() -> None:
-            channel = await websocket_connect(socket_of(teleop))
-            fast = {"touch": 1, "mode": "wheels", "wheels": dict.fromkeys(("front_left", "rear_left"), 30.0)}
-            await until(lambda: teleop.state().get("time", 0.0) > 0.5, channel, **fast)
-            await channel.write_message(json.dumps({"touch": 2, "action": "reset"}))
-            await until(lambda: teleop.state()["time"] < 0.4)
-            state = teleop.state()
-            assert state["fault"] == ""
-            assert state["pose"] == pytest.approx([0, 0, 0], abs=1e-3)
-            assert state["ghost"] == [0, 0, 0]
+            async with connected(teleop) as channel:
+                pair = {"touch": 1, "mode": "wheels", "wheels": dict.fromkeys(("front_left", "rear_left"), 30.0)}
+                await until(lambda: teleop.state().get("time", 0.0) > 0.5, channel, **pair)
+                assert teleop.state()["pose"][2] < -0.1
+                found.append("the robot tipped over")
+                await until(lambda: teleop.state()["fault"], channel, **pair)
+                stopped = teleop.state()["time"]
+                assert teleop.state()["fault"] == f"at t = {stopped:.2f} s the robot tipped over"
+                found.clear()
+                await channel.write_message(json.dumps({"touch": 2, "action": "reset"}))
+                await until(lambda: not teleop.state()["fault"])
+                state = teleop.state()
+                assert state["time"] < stopped
+                assert state["pose"] == pytest.approx([0, 0, 0], abs=1e-3)
+                assert state["ghost"] == [0, 0, 0]
+                await until(lambda: teleop.state()["time"] > state["time"])
 
         asyncio.run(drive())
 
@@ -111,11 +130,11 @@ def test_strangers_and_babblers_are_turned_away() -> None:
             foreign = HTTPRequest(socket_of(teleop), headers={"Origin": "http://stranger.example"})
             with pytest.raises(HTTPClientError, match="403"):
                 await websocket_connect(foreign)
-            channel = await websocket_connect(socket_of(teleop))
-            await channel.write_message('{"touch": 1, "twist": [Infinity, 0, 0]}')
-            while await channel.read_message() is not None:
-                pass
-            assert channel.close_code == 1003
+            async with connected(teleop) as channel:
+                await channel.write_message('{"touch": 1, "twist": [Infinity, 0, 0]}')
+                while await channel.read_message() is not None:
+                    pass
+                assert channel.close_code == 1003
 
         asyncio.run(strangers())
         assert not any(moment.moves for moment in teleop.history)
@@ -125,19 +144,21 @@ def test_a_hexapod_walks_and_changes_its_posture() -> None:
     with Teleop("wheel_leg_hexapod") as teleop:
 
         async def drive() -> None:
-            channel = await websocket_connect(socket_of(teleop))
-            hello = json.loads(await channel.read_message())
-            assert hello["postures"] == ["insect", "mammal"]
-            walk = {"touch": 1, "twist": [0.2, 0.0, 0.0], "posture": "insect", "gait": "tripod"}
-            await until(lambda: teleop.state().get("pose", [0])[0] > 0.06, channel, **walk)
-            state = teleop.state()
-            assert state["activity"] == "walk"
-            assert abs(state["pose"][1]) < 0.01
-            assert state["error"][0] < 0.01
-            assert any(not foot["stands"] for foot in state["feet"].values())
-            change = {**walk, "touch": 2, "twist": [0, 0, 0], "posture": "mammal"}
-            await until(lambda: teleop.state()["activity"] == "change", channel, **change)
-            assert teleop.state()["asked"]["posture"] == "mammal"
+            async with connected(teleop) as channel:
+                hello = json.loads(await channel.read_message())
+                assert hello["postures"] == ["insect", "mammal"]
+                walk = {"touch": 1, "twist": [0.2, 0.0, 0.0], "posture": "insect", "gait": "tripod"}
+                await until(lambda: teleop.state().get("pose", [0])[0] > 0.06, channel, **walk)
+                state = teleop.state()
+                assert state["activity"] == "walk"
+                assert abs(state["pose"][1]) < 0.01
+                assert state["error"][0] < 0.01
+                await until(
+                    lambda: not all(foot["stands"] for foot in teleop.state()["feet"].values()), channel, **walk
+                )
+                change = {**walk, "touch": 2, "twist": [0, 0, 0], "posture": "mammal"}
+                await until(lambda: teleop.state()["activity"] == "change", channel, **change)
+                assert teleop.state()["asked"]["posture"] == "mammal"
 
         asyncio.run(drive())
 

@@ -1,8 +1,10 @@
 """The page's server: a few files, and one WebSocket."""
 
 import asyncio
+import errno
 import itertools
 import json
+import socket
 import threading
 import time
 from collections.abc import Iterator
@@ -11,7 +13,6 @@ from typing import Any
 
 from pydantic import ValidationError
 from tornado.httpserver import HTTPServer
-from tornado.netutil import bind_sockets
 from tornado.web import Application, RequestHandler
 from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
@@ -61,8 +62,8 @@ class Server:
         self.clients: dict[int, Channel] = {}
         self.numbers: Iterator[int] = itertools.count(1)
         try:
-            self._sockets = bind_sockets(port, None if host in EVERYWHERE else host)
-        except (OSError, OverflowError) as error:
+            self._sockets = _listening(None if host in EVERYWHERE else host, port)
+        except OSError as error:
             raise RollerbenchError(
                 f"--host {host} --port {port}: {error}; accepted: a host of this machine, and a port that is free "
                 "(0 for any)"
@@ -82,8 +83,8 @@ class Server:
     def stop(self) -> None:
         """Closes all connections, and the port."""
         if not self._thread.is_alive():
-            for socket in self._sockets:
-                socket.close()
+            for each in self._sockets:
+                each.close()
             self._loop.close()
             return
         self._loop.call_soon_threadsafe(self._stopping.set)
@@ -118,6 +119,25 @@ class Server:
         for client in list(self.clients.values()):
             client.close(1001, "the simulation ended")
         await http.close_all_connections()
+
+
+def _listening(host: str | None, port: int) -> list[socket.socket]:
+    """Sockets at all addresses of a host, at one port."""
+    found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
+    sockets: list[socket.socket] = []
+    for family, address in dict.fromkeys((family, str(address[0])) for family, *_, address in found):
+        at = sockets[0].getsockname()[1] if sockets else port
+        try:
+            sockets.append(socket.create_server((address, at), family=family))
+        except OSError as error:
+            # Where the machine has no IPv6, its name may still have such an address.
+            if sockets and error.errno in (errno.EADDRNOTAVAIL, errno.EAFNOSUPPORT):
+                continue
+            for each in sockets:
+                each.close()
+            raise
+        sockets[-1].setblocking(False)
+    return sockets
 
 
 class Page(RequestHandler):

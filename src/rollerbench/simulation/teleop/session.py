@@ -45,6 +45,7 @@ def teleop_scenario(
         KinematicsError: the robot's wheels do not determine how it moves.
     """
     loaded = load_robot(robot)
+    command: dict[str, Any]
     if loaded.legs:
         step, command = LEG_STEP, {"type": "gait", "pieces": [{"duration": 1.0}]}
     elif loaded.driven_wheels:
