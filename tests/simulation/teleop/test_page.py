@@ -12,7 +12,7 @@ import pytest
 from browser import opened
 from rollerbench.simulation.teleop import Teleop
 
-PATIENCE = 20.0
+PATIENCE = 60.0
 """Machines may be slow: nothing here is waited for without an end [s]."""
 
 TIMEOUT = 0.5

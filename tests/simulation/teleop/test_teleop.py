@@ -22,7 +22,7 @@ from rollerbench.cli import main
 from rollerbench.simulation.teleop import Teleop
 from rollerbench.simulation.teleop.server import FILES
 
-PATIENCE = 20.0
+PATIENCE = 60.0
 """Machines may be slow: nothing here is waited for without an end [s]."""
 
 
