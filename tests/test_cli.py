@@ -42,7 +42,7 @@ def rollerbench(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch:
 def test_help_has_an_example_for_every_command(rollerbench: Command) -> None:
     top = process("--help")
     assert top.returncode == 0
-    for command in ("robots", "scenarios", "run", "report", "analyze", "build", "schema"):
+    for command in ("robots", "scenarios", "run", "teleop", "replay", "report", "analyze", "build", "schema"):
         assert command in top.stdout
         shown = rollerbench(command, "--help")
         assert shown.returncode == 0

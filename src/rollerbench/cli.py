@@ -124,6 +124,37 @@ def run(
         input("Press Enter to close the live page. ")
 
 
+@app.command(epilog="Example: rollerbench teleop youbot_base --set ground.friction=0.3")
+def teleop(
+    robot: Annotated[str, typer.Argument(help="Name of a shipped robot, or path to a robot.yaml.")],
+    host: Annotated[
+        str, typer.Option(help="Where to serve the page; 0.0.0.0 lets other machines see it, and drive.")
+    ] = "localhost",
+    port: Annotated[int, typer.Option(help="The page's port.", show_default="any that is free")] = 0,
+    timeout: Annotated[float, typer.Option(help="Seconds without a word from the page until the robot stops.")] = 0.5,
+    set_: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="Set a field of the scenario, such as ground.friction=0.3."),
+    ] = None,
+    open_: Annotated[
+        bool | None, typer.Option("--open/--no-open", help="Open the page in a browser.", show_default="on a terminal")
+    ] = None,
+) -> None:
+    """Drive a simulated robot by hand, from a page with sliders, keyboard and gamepad, beside its ghost."""
+    import webbrowser
+
+    from rollerbench.simulation.teleop import Teleop
+
+    def ready(url: str) -> None:
+        print(f"Drive at {url} (Ctrl-C ends)", file=sys.stderr)
+        if sys.stdout.isatty() if open_ is None else open_:
+            webbrowser.open(url)
+
+    driven = Teleop(robot, overrides=set_ or [], host=host, port=port, timeout=timeout)
+    with suppress(KeyboardInterrupt):
+        driven.run(ready)
+
+
 @app.command(epilog="Example: rollerbench reproduce differential_drive -o reproductions")
 def reproduce(
     paper: Annotated[

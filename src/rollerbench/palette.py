@@ -44,7 +44,7 @@ SLIP_SPEEDS = (0.01, 0.05, 0.2)
 SUPPORT: Color = (0.0, 0.62, 0.45)
 FOOTHOLD: Color = (0.35, 0.55, 0.48)
 
-GHOST_OPACITY = 0.35
+GHOST_OPACITY = 0.28
 SUPPORT_OPACITY = 0.35
 
 # Lengths over the size of the robot, its largest horizontal extent.

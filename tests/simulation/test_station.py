@@ -40,9 +40,9 @@ def test_ports_are_the_documented_ones() -> None:
         scenario("swerve_base"),
         scenario("kiwi", controller=TRACKING),
     ):
-        for command in ("scenario", "external", "rest"):
+        for command in ("scenario", "external", "rest", "wheels"):
             inputs, outputs = ports(rb.build_station(each, command=command))
-            assert bool(inputs) == (command == "external")
+            assert bool(inputs) == (command in ("external", "wheels"))
             found = (found[0] | inputs, found[1] | outputs)
     assert found == documented_ports(Station)
 

@@ -27,10 +27,7 @@ def simulate(scenario: Scenario, *, meshcat: Meshcat | None = None, progress: Pr
     simulator = Simulator(station)
     follow_rollers(simulator)
     configure(simulator, scenario)
-    try:
-        _stand_at_rest(simulator, station, scenario)
-    except (RuntimeError, SystemExit) as error:
-        raise SimulationError(f"{scenario.name}: Drake cannot let the robot stand: {error}") from error
+    stand_at_rest(simulator, station, scenario)
     started = time.perf_counter()
     model, plant_context = station.parts.model, _plant_context(station, simulator)
     failure = advance(simulator, scenario, lambda: fault(model, plant_context), progress)
@@ -40,8 +37,19 @@ def simulate(scenario: Scenario, *, meshcat: Meshcat | None = None, progress: Pr
     return Simulated(recording=recording, failure=failure, wall_time=wall_time)
 
 
-def _stand_at_rest(simulator: Simulator, station: Station, scenario: Scenario) -> None:
-    """Starts the robot at the origin, at rest, its weight on its wheels as a moment of standing still leaves it."""
+def stand_at_rest(simulator: Simulator, station: Station, scenario: Scenario) -> None:
+    """Starts the robot at the origin, at rest, its weight on its wheels as a moment of standing still leaves it.
+
+    Raises:
+        SimulationError: the robot cannot stand.
+    """
+    try:
+        _stand(simulator, station, scenario)
+    except (RuntimeError, SystemExit) as error:
+        raise SimulationError(f"{scenario.name}: Drake cannot let the robot stand: {error}") from error
+
+
+def _stand(simulator: Simulator, station: Station, scenario: Scenario) -> None:
     trial = Station(scenario, command="rest", visuals=False)
     waiting = Simulator(trial)
     follow_rollers(waiting)

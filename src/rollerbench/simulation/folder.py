@@ -92,9 +92,7 @@ def write_folder(
             "robot.yaml": to_yaml(scenario.robot),
             "model.sdf": model,
             "summary.json": json.dumps(summary, indent=2, allow_nan=False) + "\n",
-            "report.html": report_page(
-                [_stored(folder.name, scenario, recording, summary, page, picture)], figures=[figures]
-            ),
+            "report.html": report_page([stored], figures=[figures]),
             "recording.html": page,
             "diagram.svg": diagram_svg(scenario) if scenario.recording.diagram else None,
         }

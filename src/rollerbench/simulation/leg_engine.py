@@ -55,10 +55,10 @@ class _Watch:
         plan = self._parts.planner.plan(self._planner_context)
         if plan.activity == "halt" and self.halted is None:
             self.halted = f"at t = {plan.time:.2f} s the robot halted: {plan.status}"
-        return _fall(self._parts.model, self._plant_context, plan.desired[2])
+        return fall(self._parts.model, self._plant_context, plan.desired[2])
 
 
-def _fall(model: RobotModel, context: object, height: float) -> str | None:
+def fall(model: RobotModel, context: object, height: float) -> str | None:
     """Whether the robot fell, in words, or None."""
     if not np.isfinite(model.plant.GetPositionsAndVelocities(context, model.model_instance)).all():
         return NOT_FINITE

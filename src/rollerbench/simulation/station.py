@@ -16,7 +16,7 @@ from rollerbench.simulation.drake_config import add_plant
 from rollerbench.simulation.leg_station import LegStation
 from rollerbench.simulation.motors import Motors, add_motors, add_roll_resistance, servo_gains_of
 from rollerbench.simulation.scenario import Scenario, load_scenario
-from rollerbench.simulation.wheel_command import CommandFrom, add_command, drive_of, steers
+from rollerbench.simulation.wheel_command import FOR_LEGS, CommandFrom, add_command, drive_of, steers
 from rollerbench.systems import Odometry, PlanarState, SlipMonitor, SteeredOdometry
 from rollerbench.visualization.scene import add_bump_visuals, add_ground_visual, add_meshcat
 
@@ -50,7 +50,10 @@ class Station(Diagram):
 
     Input ports, only if the command comes from outside, and then the one that fits the scenario:
         twist_command (3): body twist [m/s, m/s, rad/s]; where the scenario commands a twist, waypoints or a path.
-        wheel_command (n_driven): speeds of the driven wheels [rad/s]; where it commands wheel speeds.
+        wheel_command (n_driven): speeds of the driven wheels [rad/s]; where it commands wheel speeds, and whatever it
+            commands with command="wheels".
+        steering_command (2 n_steered): angles of the steered wheels from heading_deg, then their rates [rad, rad/s];
+            with command="wheels" only, if there are such wheels.
         effort_command (n_driven): torques of the driven wheels [N m]; where it commands wheel efforts.
         reference_pose (3), reference_twist (3): where B should be in W [m, m, rad], and its twist there in its own
             axes [m/s, m/s, rad/s]; in place of these, where the controller tracks poses.
@@ -96,7 +99,7 @@ class Station(Diagram):
         Args:
             scenario: What to simulate.
             command: "scenario" drives the robot as the scenario says; "external" exports inputs for that; "rest" holds
-                the wheels.
+                the wheels; "wheels" exports inputs of the wheels, whatever the scenario commands.
             meshcat: Where to show the robot.
             log: Whether to record outputs (see `StationParts.logs`).
             visuals: Whether the robot shall be seen, in the meshcat or by what is connected to query_object.
@@ -152,8 +155,8 @@ def build_station(
 
     Args:
         scenario: Scenario, name of a shipped one, or path to a scenario.yaml.
-        command: "scenario" drives the robot as the scenario says; "external" exports inputs for that; "rest", for
-            robots on wheels, holds these.
+        command: "scenario" drives the robot as the scenario says; "external" exports inputs for that; for robots on
+            wheels "rest" holds these, and "wheels" exports inputs of each, whatever the scenario commands.
         meshcat: Where to show the robot.
         slip: Whether robots on wheels export slip and normal_forces, which no AutoDiffXd can tell.
 
@@ -162,7 +165,7 @@ def build_station(
         DescriptionError, InfeasibleTwist: as of `Station`.
     """
     loaded = load_scenario(scenario)
-    accepted = get_args(CommandFrom)[: 2 if loaded.robot.legs else 3]
+    accepted = FOR_LEGS if loaded.robot.legs else get_args(CommandFrom)
     if command not in accepted:
         raise SimulationError(f"build_station: command = {command!r}: accepted: {', '.join(map(repr, accepted))}")
     if loaded.robot.legs:

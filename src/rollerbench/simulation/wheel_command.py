@@ -16,12 +16,18 @@ from rollerbench.simulation.scenario import Scenario
 from rollerbench.simulation.settings import PoseTracking
 from rollerbench.systems import InverseKinematics, PoseTracker, ReferenceSource, SteeringKinematics, TwistLimiter
 
-CommandFrom = Literal["scenario", "external", "rest"]
+CommandFrom = Literal["scenario", "external", "rest", "wheels"]
+
+FOR_LEGS: tuple[CommandFrom, ...] = ("scenario", "external")
+"""Those that robots on legs know."""
+
+WITHOUT_COMMAND: tuple[CommandFrom, ...] = ("rest", "wheels")
+"""Those for which it does not matter what the scenario commands."""
 
 
 def drive_of(scenario: Scenario, command: CommandFrom) -> Drive:
     """What turns the wheels."""
-    if isinstance(scenario.command, WheelEffortsCommand) and command != "rest":
+    if isinstance(scenario.command, WheelEffortsCommand) and command not in WITHOUT_COMMAND:
         return "efforts"
     return "servo" if scenario.wheel_control.servo == "implicit" else "pid"
 
@@ -30,6 +36,8 @@ def steers(scenario: Scenario, command: CommandFrom) -> bool:
     """Whether wheels steer on the way."""
     if command == "rest" or not scenario.robot.steered_wheels:
         return False
+    if command == "wheels":
+        return True
     of_wheels = isinstance(scenario.command, WheelSpeedsCommand | WheelEffortsCommand)
     return scenario.tracking is not None or (scenario.motion.steers if command == "scenario" else not of_wheels)
 
@@ -44,6 +52,8 @@ def add_command(
     """Connects the motors with what commands them; returns output ports to export."""
     if command == "rest":
         return _rest(builder, scenario, motors)
+    if command == "wheels":
+        return _add_wheel_inputs(builder, scenario, motors)
     if scenario.tracking is not None:
         twist, ports = _add_tracker(builder, scenario, scenario.tracking, sensors, external=command == "external")
         return ports | _follow_twist(builder, scenario, motors, twist, steering=True)
@@ -64,6 +74,16 @@ def _rest(builder: DiagramBuilder, scenario: Scenario, motors: Motors) -> dict[s
     still = ConstantVectorSource(np.zeros(len(scenario.robot.driven_wheels)))
     speeds = builder.AddNamedSystem("rest", still).get_output_port()
     return _connect(builder, scenario, motors, speeds, held=True)
+
+
+def _add_wheel_inputs(builder: DiagramBuilder, scenario: Scenario, motors: Motors) -> dict[str, OutputPort]:
+    """Exports what the motors are told, each by itself."""
+    driven = builder.AddNamedSystem("wheel_command", PassThrough(len(scenario.robot.driven_wheels)))
+    builder.ExportInput(driven.get_input_port(), "wheel_command")
+    builder.Connect(driven.get_output_port(), motors.speeds)
+    if motors.steering is not None:
+        builder.ExportInput(motors.steering, "steering_command")
+    return {"wheel_speed_command": driven.get_output_port()}
 
 
 def _add_inputs(builder: DiagramBuilder, scenario: Scenario, motors: Motors) -> dict[str, OutputPort]:

@@ -33,13 +33,13 @@ REFERENCE_COLOR = Rgba(0.10, 0.45, 0.85, 1.0)
 SIMULATED_COLOR = Rgba(0.90, 0.45, 0.05, 1.0)
 
 
-def local_meshcat() -> Meshcat:
-    """A Meshcat server that only this machine can reach."""
+def local_meshcat(host: str = "localhost") -> Meshcat:
+    """A Meshcat server that only this machine can reach, unless it is bound to another host."""
     logger = logging.getLogger("drake")
     level = logger.level
     logger.setLevel(logging.WARNING)  # Every run would announce an address that nobody needs.
     try:
-        return Meshcat(MeshcatParams(host="localhost", show_stats_plot=False))
+        return Meshcat(MeshcatParams(host=host, show_stats_plot=False))
     finally:
         logger.setLevel(level)
 
