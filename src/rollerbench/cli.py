@@ -79,9 +79,7 @@ def run(
     port: Annotated[
         int | None, typer.Option(help="With --live: port to listen at; 0 for any.", show_default="first free from 7000")
     ] = None,
-    camera: Annotated[
-        str | None, typer.Option(help="iso, top, or follow: with the robot.", show_default="iso")
-    ] = None,
+    camera: Annotated[str | None, typer.Option(help="iso, top, or follow: with the robot.", show_default="iso")] = None,
     forces: Annotated[
         bool, typer.Option("--forces", help="Show and record the forces of the ground, coloured by slip.")
     ] = False,

@@ -29,7 +29,7 @@ def configure(simulator: Simulator, scenario: Scenario) -> None:
 
 
 class Restart:
-    """Brings a simulation back to where it is when this is made, which is after the simulator is initialized."""
+    """Brings a simulation back to where it is when this is made, which is before the simulator is initialized."""
 
     def __init__(self, simulator: Simulator, logs: Iterable[VectorLogSink]) -> None:
         """Remembers the present of a simulator, and the logs to clear."""

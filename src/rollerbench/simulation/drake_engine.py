@@ -34,11 +34,12 @@ def simulate(
     configure(simulator, scenario)
     try:
         _stand_at_rest(simulator, station, scenario)
+        restart = Restart(simulator, station.parts.logs.values())
+        simulator.Initialize()
     except (RuntimeError, SystemExit) as error:
         raise SimulationError(f"{scenario.name}: Drake cannot let the robot stand: {error}") from error
     show = None
     if meshcat is not None:
-        restart = Restart(simulator, station.parts.logs.values())
         show = LiveShow(meshcat, simulator, scenario, restart=restart, live=live)
     model, plant_context = station.parts.model, _plant_context(station, simulator)
     advanced = advance(simulator, scenario, lambda: fault(model, plant_context), progress, show)
@@ -66,7 +67,6 @@ def _stand_at_rest(simulator: Simulator, station: Station, scenario: Scenario) -
     roll, pitch, _ = RollPitchYaw(pose.rotation()).vector()
     upright = RigidTransform(RollPitchYaw(roll, pitch, 0.0), [0.0, 0.0, pose.translation()[2]])
     model.plant.SetFreeBodyPose(plant_context, model.body, upright)
-    simulator.Initialize()
 
 
 def _plant_context(station: Station, simulator: Simulator) -> Context:

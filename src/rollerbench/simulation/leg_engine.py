@@ -34,10 +34,10 @@ def simulate(
     station = LegStation(scenario, meshcat=meshcat, log=True, visuals=meshcat is not None)
     simulator = Simulator(station)
     configure(simulator, scenario)
+    restart = Restart(simulator, station.parts.logs.values())
     simulator.Initialize()
     watch, show = _Watch(simulator, station), None
     if meshcat is not None:
-        restart = Restart(simulator, station.parts.logs.values())
 
         def go_back() -> None:
             restart()

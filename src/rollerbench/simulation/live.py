@@ -258,7 +258,8 @@ def _reference(station: Station | LegStation, scenario: Scenario) -> tuple[Calla
         desired = station.GetOutputPort("desired")
         return lambda context: _pose(desired.Eval(context)), scenario.rehearsal.reference
     step, height = scenario.plant.time_step, -scenario.robot.ground_height
-    times: Array = step * np.arange(round(scenario.duration / step) + 2)
+    last = round(scenario.duration / step) + 1
+    times = np.linspace(0.0, last * step, last + 1)
     path = reference_poses(scenario.motion.twist, times)
 
     def pose(context: Context) -> Array:
