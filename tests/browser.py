@@ -1,4 +1,4 @@
-"""A real, headless browser that has no network, for tests of pages."""
+"""A real, headless browser that has no network, or only that of this machine, for tests of pages."""
 
 import os
 import shutil
@@ -8,10 +8,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Page, sync_playwright
+from playwright.sync_api import Page, Request, WebSocket, sync_playwright
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
 ARGUMENTS = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-background-networking")
+LOCAL = ("http://localhost:", "ws://localhost:")
 
 
 @dataclass
@@ -24,22 +25,28 @@ class Watched:
 
 
 @contextmanager
-def opened(file: Path, width: int = 800, height: int = 600) -> Iterator[Watched]:
-    """Opens a file offline; skips the test where there is no browser, unless REQUIRE_BROWSER is set."""
+def opened(address: Path | str, width: int = 800, height: int = 600) -> Iterator[Watched]:
+    """Opens a file offline, or a page that this machine serves; requests elsewhere are told.
+
+    Skips the test where there is no browser, unless REQUIRE_BROWSER is set.
+    """
     executable = next(filter(None, map(shutil.which, NAMES)), None)
     if executable is None:
         assert not os.environ.get("REQUIRE_BROWSER"), f"no browser found: install one of {', '.join(NAMES)}"
         pytest.skip("no Chromium or Chrome on PATH")
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=executable, args=list(ARGUMENTS), chromium_sandbox=False)
-        context = browser.new_context(offline=True, viewport={"width": width, "height": height})
+        context = browser.new_context(offline=isinstance(address, Path), viewport={"width": width, "height": height})
         watched = Watched(context.new_page())
-        own = file.resolve().as_uri()
-        local = ("data:", "blob:")
-        watched.page.on(
-            "request",
-            lambda request: None if request.url.startswith((own, *local)) else watched.requests.append(request.url),
-        )
+        own = address.resolve().as_uri() if isinstance(address, Path) else address
+        local = (own,) if isinstance(address, Path) else LOCAL
+
+        def note(asked: Request | WebSocket) -> None:
+            if not asked.url.startswith(("data:", "blob:", *local)):
+                watched.requests.append(asked.url)
+
+        watched.page.on("request", note)
+        watched.page.on("websocket", note)
         watched.page.on(
             "console",
             lambda message: watched.errors.append(message.text) if message.type == "error" else None,

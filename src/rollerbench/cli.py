@@ -266,6 +266,9 @@ def _live_page(host: str, port: int | None) -> dict[str, Any]:
 
     meshcat = local_meshcat(host, port)
     print(f"Live at {meshcat.web_url()}", file=sys.stderr)
+    print(
+        "Space pauses, . steps, R resets, - and = change the speed, 1 2 3 the view; or Open Controls.", file=sys.stderr
+    )
     asked = False
 
     def stay() -> bool:

@@ -43,9 +43,10 @@ CAMERAS: dict[str, View] = {view.capitalize(): view for view in get_args(View)}
 class Live:
     """Paces a run to real time and lets its page control it (`rollerbench.run(..., meshcat=..., live=Live())`).
 
-    The page has the buttons Pause / Resume (space), Step (full stop), Reset (R), Iso, Top and Follow (1, 2, 3), and
-    the slider Speed (- and =), which starts at the scenario's simulator.target_realtime_rate if it has one, else at 1.
-    None of them changes what is simulated: the recording is bitwise that of a run that nobody watched.
+    Under Open Controls the page has the buttons Pause / Resume (space), Step (full stop), Reset (R), Iso, Top and
+    Follow (1, 2, 3), and the slider Speed (- and =), which starts at the scenario's simulator.target_realtime_rate if
+    it has one, else at 1. None of them changes what is simulated: the recording is bitwise that of a run that nobody
+    watched. The real-time factor in its summary is the simulation's own, without the waiting.
 
     Attributes:
         patience: How long the robot waits at the start for a page to connect [s].
@@ -219,7 +220,7 @@ class LiveShow:
                 self._pace.restart()
                 live.sleep(POLL)
             else:
-                live.sleep(min(POLL, self._pace.ahead()))
+                live.sleep(min(POLL, max(0.0, self._pace.ahead())))
 
     def _go_back(self) -> None:
         self._restart()
