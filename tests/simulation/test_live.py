@@ -91,7 +91,7 @@ def test_pace_waits_for_the_clock_and_forgives_what_is_too_late() -> None:
 def test_a_live_run_takes_its_time_and_records_what_an_unseen_one_does(
     speed: float, scenario: rb.Scenario, unseen: rb.RunResult, meshcat: Meshcat
 ) -> None:
-    """The clock stands still while Drake works: waiting makes up the duration over the speed, but for the last piece."""
+    """The clock stands still while Drake works: waiting makes up the duration over the speed but for the last piece."""
     clock = Clock()
     timed = rb.load_scenario(scenario, overrides={"simulator.target_realtime_rate": speed})
     result = live_run(timed, meshcat, clock)
@@ -206,10 +206,14 @@ def test_a_port_in_use_and_a_live_run_without_a_page_are_refused(scenario: rb.Sc
 
 
 def test_the_page_pauses_the_run_and_shows_the_ghost_apart_from_the_robot() -> None:
-    """Wheels of unequal size turn the cart away from its ghost: orange and blue arrows are apart."""
+    """A motor that turns less than it is told leads the cart away from its ghost: their colours are apart."""
     scenario = rb.load_scenario(
         "cart_straight",
-        overrides={"errors.radius_scale": {"left": 0.8}, "recording.html": False, "recording.camera": "follow"},
+        overrides={
+            "errors.gear_error": {"left": {"constant": -0.3}},
+            "recording.html": False,
+            "recording.camera": "follow",
+        },
     )
     times, address, over = [0.0], [], threading.Event()
 
@@ -222,12 +226,12 @@ def test_the_page_pauses_the_run_and_shows_the_ghost_apart_from_the_robot() -> N
     worker = threading.Thread(target=simulate)
     worker.start()
     try:
-        while not address:
+        while not address and worker.is_alive():
             over.wait(0.01)
         with opened(address[0]) as watched:
             page = watched.page
             page.get_by_text("Open Controls").click()
-            while times[-1] < 0.6 * scenario.duration:
+            while times[-1] < 0.6 * scenario.duration and worker.is_alive():
                 page.wait_for_timeout(50)
             page.get_by_text("Pause / Resume", exact=True).click()
             page.wait_for_timeout(300)
