@@ -39,6 +39,7 @@ from .plant import add_ground as add_ground
 from .plant import add_robot as add_robot
 from .plant import follow_rollers as follow_rollers
 from .recording import Recording as Recording
+from .simulation import Live as Live
 from .simulation import RunResult as RunResult
 from .simulation import Scenario as Scenario
 from .simulation import build_station as build_station

@@ -5,7 +5,7 @@ import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Protocol
+from typing import TYPE_CHECKING, Annotated, Any, Protocol
 
 import typer
 
@@ -25,6 +25,7 @@ app = typer.Typer(
 )
 
 BAD_INPUT, FAILED = 2, 3
+LOCAL = "localhost"
 
 
 def main() -> None:
@@ -77,6 +78,14 @@ def run(
         bool, typer.Option("--check-step", help="Simulate a second time with half the step, and compare.")
     ] = False,
     live: Annotated[bool, typer.Option("--live", help="Show the run in a browser, in real time.")] = False,
+    host: Annotated[str, typer.Option(help="With --live: address to listen at; * lets other machines in.")] = LOCAL,
+    port: Annotated[
+        int | None, typer.Option(help="With --live: port to listen at; 0 for any.", show_default="first free from 7000")
+    ] = None,
+    camera: Annotated[str | None, typer.Option(help="iso, top, or follow: with the robot.", show_default="iso")] = None,
+    forces: Annotated[
+        bool, typer.Option("--forces", help="Show and record the forces of the ground, coloured by slip.")
+    ] = False,
     no_recording: Annotated[
         bool, typer.Option("--no-recording", help="Write no recording.html, which is faster.")
     ] = False,
@@ -88,7 +97,10 @@ def run(
         bool, typer.Option("--diagram", help="Draw the simulated diagram, its systems and ports, as diagram.svg.")
     ] = False,
 ) -> None:
-    """Simulate a scenario, compare it with the equations, and write the run folder."""
+    """Simulate a scenario, compare it with the equations, and write the run folder.
+
+    With --live, the page can pause, step, slow down and repeat the run; that changes nothing of what is recorded.
+    """
     from rollerbench import simulation
     from rollerbench.report.terminal import summary_tables
 
@@ -98,19 +110,17 @@ def run(
     overrides += ["recording.html=false"] if no_recording else []
     overrides += [f"recording.video={video}"] if video is not None else []
     overrides += ["recording.diagram=true"] if diagram else []
-    overrides += ["simulator.target_realtime_rate=1.0"] if live else []
+    overrides += [f"recording.camera={camera}"] if camera is not None else []
+    overrides += ["recording.forces=true"] if forces else []
     loaded = simulation.load_scenario(scenario, overrides=overrides, robot=robot)
     if live and loaded.engine == "mujoco":
         raise RollerbenchError("--live: MuJoCo's runs are not shown; accepted: --engine drake or both")
-    meshcat = None
-    if live:
-        from rollerbench.visualization.scene import local_meshcat
-
-        meshcat = local_meshcat()
-        print(f"Live at {meshcat.web_url()}", file=sys.stderr)
+    if not live and (host != LOCAL or port is not None):
+        raise RollerbenchError("--host, --port: accepted: together with --live")
+    shown = _live_page(host, port) if live else {}
     try:
         with _progress(loaded.name, loaded.duration) as progress:
-            result = simulation.run(loaded, output=output, progress=progress, meshcat=meshcat)
+            result = simulation.run(loaded, output=output, progress=progress, **shown)
     except SimulationError as error:
         if error.result is not None:
             for table in summary_tables(error.result.summary):
@@ -120,8 +130,6 @@ def run(
     for table in summary_tables(result.summary):
         _print(table)
     _print(f"Written: {result.folder}")
-    if live and sys.stdin.isatty():
-        input("Press Enter to close the live page. ")
 
 
 @app.command(epilog="Example: rollerbench teleop youbot_base --set ground.friction=0.3")
@@ -354,6 +362,35 @@ def _view(camera: str) -> "View":
         if camera == view:
             return view
     raise RollerbenchError(f"--camera {camera!r}: accepted: {', '.join(DIRECTIONS)}")
+
+
+def _live_page(host: str, port: int | None) -> dict[str, Any]:
+    """What shows a run live: arguments of `run`. At a terminal a browser opens, and the page stays until Enter."""
+    from rollerbench.simulation import Live
+    from rollerbench.visualization.scene import local_meshcat
+
+    meshcat = local_meshcat(host, port)
+    print(f"Live at {meshcat.web_url()}", file=sys.stderr)
+    print(
+        "Space pauses, . steps, R resets, - and = change the speed, 1 2 3 the view; or Open Controls.", file=sys.stderr
+    )
+    asked = False
+
+    def stay() -> bool:
+        nonlocal asked
+        if not asked:
+            asked = True
+            termios.tcflush(sys.stdin, termios.TCIFLUSH)
+            print("The run is over. Reset in the page repeats it; Enter ends.", file=sys.stderr)
+        return not select.select([sys.stdin], [], [], 0.0)[0]
+
+    if not sys.stdin.isatty():
+        return {"meshcat": meshcat, "live": Live()}
+    import select
+    import termios
+
+    _browse(meshcat.web_url(), wanted=True)
+    return {"meshcat": meshcat, "live": Live(patience=5.0, stay=stay)}
 
 
 def _browse(address: str, *, wanted: bool) -> None:

@@ -1,7 +1,5 @@
 """Simulates a scenario with Drake."""
 
-import time
-
 from pydrake.geometry import Meshcat
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.systems.analysis import Simulator
@@ -9,15 +7,22 @@ from pydrake.systems.framework import Context
 
 from rollerbench.errors import SimulationError
 from rollerbench.plant import follow_rollers
-from rollerbench.simulation.advance import advance, configure
+from rollerbench.simulation.advance import Restart, advance, configure
+from rollerbench.simulation.live import Live, LiveShow
 from rollerbench.simulation.log import Progress, Simulated, provenance, recording_of, station_samples
 from rollerbench.simulation.scenario import Scenario
 from rollerbench.simulation.station import Station
 from rollerbench.simulation.watch import SETTLE_TIME, fault
 
 
-def simulate(scenario: Scenario, *, meshcat: Meshcat | None = None, progress: Progress | None = None) -> Simulated:
-    """Runs a scenario in Drake; a meshcat records it.
+def simulate(
+    scenario: Scenario,
+    *,
+    meshcat: Meshcat | None = None,
+    live: Live | None = None,
+    progress: Progress | None = None,
+) -> Simulated:
+    """Runs a scenario in Drake; a meshcat shows it, paced if it is live.
 
     Raises:
         DescriptionError: Drake refuses a setting.
@@ -27,17 +32,18 @@ def simulate(scenario: Scenario, *, meshcat: Meshcat | None = None, progress: Pr
     simulator = Simulator(station)
     follow_rollers(simulator)
     configure(simulator, scenario)
-    stand_at_rest(simulator, station, scenario)
-    started = time.perf_counter()
+    restart = start_at_rest(simulator, station, scenario)
+    show = None
+    if meshcat is not None:
+        show = LiveShow(meshcat, simulator, scenario, restart=restart, live=live)
     model, plant_context = station.parts.model, _plant_context(station, simulator)
-    failure = advance(simulator, scenario, lambda: fault(model, plant_context), progress)
-    wall_time = time.perf_counter() - started
+    advanced = advance(simulator, scenario, lambda: fault(model, plant_context), progress, show)
     samples = station_samples(station, scenario, simulator.get_context())
     recording = recording_of(samples, scenario, provenance(scenario, "drake"))
-    return Simulated(recording=recording, failure=failure, wall_time=wall_time)
+    return Simulated(recording=recording, failure=advanced.failure, wall_time=advanced.wall_time)
 
 
-def stand_at_rest(simulator: Simulator, station: Station, scenario: Scenario) -> None:
+def start_at_rest(simulator: Simulator, station: Station, scenario: Scenario) -> Restart:
     """Starts the robot at the origin, at rest, its weight on its wheels as a moment of standing still leaves it.
 
     Raises:
@@ -45,8 +51,11 @@ def stand_at_rest(simulator: Simulator, station: Station, scenario: Scenario) ->
     """
     try:
         _stand(simulator, station, scenario)
+        restart = Restart(simulator, station.parts.logs.values())
+        simulator.Initialize()
     except (RuntimeError, SystemExit) as error:
         raise SimulationError(f"{scenario.name}: Drake cannot let the robot stand: {error}") from error
+    return restart
 
 
 def _stand(simulator: Simulator, station: Station, scenario: Scenario) -> None:
@@ -67,7 +76,6 @@ def _stand(simulator: Simulator, station: Station, scenario: Scenario) -> None:
     roll, pitch, _ = RollPitchYaw(pose.rotation()).vector()
     upright = RigidTransform(RollPitchYaw(roll, pitch, 0.0), [0.0, 0.0, pose.translation()[2]])
     model.plant.SetFreeBodyPose(plant_context, model.body, upright)
-    simulator.Initialize()
 
 
 def _plant_context(station: Station, simulator: Simulator) -> Context:

@@ -1,16 +1,16 @@
 """Simulates a scenario of a robot on legs with Drake."""
 
 import math
-import time
 
 import numpy as np
 from pydrake.geometry import Meshcat
 from pydrake.systems.analysis import Simulator
 
 from rollerbench.plant import RobotModel
-from rollerbench.simulation.advance import advance, configure
+from rollerbench.simulation.advance import Restart, advance, configure
 from rollerbench.simulation.leg_log import leg_recording
 from rollerbench.simulation.leg_station import LegStation
+from rollerbench.simulation.live import Live, LiveShow
 from rollerbench.simulation.log import Progress, Simulated
 from rollerbench.simulation.scenario import Scenario
 from rollerbench.simulation.watch import NOT_FINITE, TIP_ANGLE, tilt
@@ -19,8 +19,14 @@ FALLEN = 0.5
 """A body below this share of the height that it should have has fallen [-]."""
 
 
-def simulate(scenario: Scenario, *, meshcat: Meshcat | None = None, progress: Progress | None = None) -> Simulated:
-    """Runs a scenario in Drake; a meshcat records it.
+def simulate(
+    scenario: Scenario,
+    *,
+    meshcat: Meshcat | None = None,
+    live: Live | None = None,
+    progress: Progress | None = None,
+) -> Simulated:
+    """Runs a scenario in Drake; a meshcat shows it, paced if it is live.
 
     Raises:
         DescriptionError: the legs cannot do what they are asked, or Drake refuses a setting.
@@ -28,13 +34,20 @@ def simulate(scenario: Scenario, *, meshcat: Meshcat | None = None, progress: Pr
     station = LegStation(scenario, meshcat=meshcat, log=True, visuals=meshcat is not None)
     simulator = Simulator(station)
     configure(simulator, scenario)
+    restart = Restart(simulator, station.parts.logs.values())
     simulator.Initialize()
-    started = time.perf_counter()
-    watch = _Watch(simulator, station)
-    failure = advance(simulator, scenario, watch.look, progress) or watch.halted
-    wall_time = time.perf_counter() - started
+    watch, show = _Watch(simulator, station), None
+    if meshcat is not None:
+
+        def go_back() -> None:
+            restart()
+            watch.halted = None
+
+        show = LiveShow(meshcat, simulator, scenario, restart=go_back, live=live)
+    advanced = advance(simulator, scenario, watch.look, progress, show)
+    failure = advanced.failure or watch.halted
     recording = leg_recording(station, scenario, simulator.get_context())
-    return Simulated(recording=recording, failure=failure, wall_time=wall_time)
+    return Simulated(recording=recording, failure=failure, wall_time=advanced.wall_time)
 
 
 class _Watch:

@@ -95,6 +95,7 @@ class LegStation(Diagram):
             them [N, N m].
         normal_forces (n_legs): loads of the feet [N].
         contact_forces (3 n_legs): forces of the ground on the feet in W, foot by foot [N].
+        contact_points (3 n_legs): where they act [m].
         slip (n_legs): how fast feet slide over the ground [m/s].
         odometry (3): pose from the legs that stand [m, m, rad]; with a closed loop only.
         contact_results: Drake's ContactResults.
@@ -173,6 +174,7 @@ class LegStation(Diagram):
             "contact_efforts": plant.get_generalized_contact_forces_output_port(model.model_instance),
             "normal_forces": contacts.GetOutputPort("normal_forces"),
             "contact_forces": contacts.GetOutputPort("contact_forces"),
+            "contact_points": contacts.GetOutputPort("contact_points"),
             "slip": contacts.GetOutputPort("slip_speeds"),
             "contact_results": plant.get_contact_results_output_port(),
             "query_object": scene_graph.get_query_output_port(),

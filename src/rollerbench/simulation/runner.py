@@ -13,6 +13,7 @@ from rollerbench.recording import Recording
 from rollerbench.sdf import robot_to_sdf
 from rollerbench.simulation import drake_engine, leg_engine, mujoco_engine, picture
 from rollerbench.simulation.folder import check_folder, write_folder
+from rollerbench.simulation.live import Live
 from rollerbench.simulation.log import Progress, Simulated
 from rollerbench.simulation.scenario import Scenario, load_scenario
 from rollerbench.simulation.summary import apart, cross_check, summarize
@@ -45,6 +46,7 @@ def run(
     output: str | Path | None = None,
     save: bool = True,
     meshcat: Meshcat | None = None,
+    live: Live | None = None,
     progress: Progress | None = None,
 ) -> RunResult:
     """Simulates a scenario.
@@ -53,7 +55,8 @@ def run(
         scenario: Scenario, name of a shipped one, path to a scenario.yaml, or its content.
         output: Run folder to write, new or from an earlier run; by default runs/NAME.
         save: Whether to write the run folder.
-        meshcat: A Meshcat to show the robot in while Drake simulates it.
+        meshcat: A Meshcat to show the robot in while Drake simulates it, with its ghost and trails.
+        live: How to pace the run to real time, with buttons in the meshcat; without, it is as fast as it can be.
         progress: Called with the simulated time [s] now and then.
 
     Returns:
@@ -77,7 +80,10 @@ def run(
         mujoco_engine.check(scenario)
     _warn_about_step(scenario)
 
-    simulated = _simulated(scenario, meshcat, progress)
+    if live is not None and meshcat is None:
+        raise SimulationError("run: live: accepted: together with a meshcat")
+
+    simulated = _simulated(scenario, meshcat, live, progress)
     recording, failure = simulated.recording, simulated.failure
     if not len(recording.time):
         raise SimulationError(f"{scenario.name}: {failure}; nothing was recorded")
@@ -113,12 +119,17 @@ def run(
     return result
 
 
-def _simulated(scenario: Scenario, meshcat: Meshcat | None = None, progress: Progress | None = None) -> Simulated:
+def _simulated(
+    scenario: Scenario,
+    meshcat: Meshcat | None = None,
+    live: Live | None = None,
+    progress: Progress | None = None,
+) -> Simulated:
     if scenario.engine == "mujoco":
         return mujoco_engine.simulate(scenario, progress=progress)
     if scenario.robot.legs:
-        return leg_engine.simulate(scenario, meshcat=meshcat, progress=progress)
-    return drake_engine.simulate(scenario, meshcat=meshcat, progress=progress)
+        return leg_engine.simulate(scenario, meshcat=meshcat, live=live, progress=progress)
+    return drake_engine.simulate(scenario, meshcat=meshcat, live=live, progress=progress)
 
 
 def _scene(scenario: Scenario, recording: Recording, summary: Mapping[str, Any], model: str) -> Scene | None:

@@ -24,6 +24,10 @@ LOGGED = ("state", "wheel_speed_command", "wheel_speeds", "net_actuation", "odom
 """Outputs that a run records."""
 
 
+CONTACTS = ("normal_forces", "contact_forces", "contact_points")
+"""Outputs of the `SlipMonitor` besides slip."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class StationParts:
     """Subsystems of a station.
@@ -71,6 +75,7 @@ class Station(Diagram):
         slip (n_wheels): how fast wheels slide over the ground [m/s] (`SlipMonitor`).
         normal_forces (n_wheels): loads of the wheels [N].
         contact_forces (3 n_wheels): forces of the ground on the wheels in W, wheel by wheel [N].
+        contact_points (3 n_wheels): where they act [m].
         state (nq + nv): state of the robot's model instance, as the plant orders it.
         reference_pose (3), reference_twist (3), twist_command (3): what the controller tracks, and what it commands;
             only where it tracks poses.
@@ -202,7 +207,7 @@ def _add_sensors(
         monitor = builder.AddNamedSystem("slip_monitor", SlipMonitor(model))
         builder.Connect(outputs["contact_results"], monitor.GetInputPort("contact_results"))
         outputs |= {"slip": monitor.GetOutputPort("slip_speeds")}
-        outputs |= {name: monitor.GetOutputPort(name) for name in ("normal_forces", "contact_forces")}
+        outputs |= {name: monitor.GetOutputPort(name) for name in CONTACTS}
     if model.roller_window is not None:
         outputs["rollers"] = model.roller_window.GetOutputPort("rollers")
     return outputs

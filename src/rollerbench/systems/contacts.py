@@ -32,6 +32,7 @@ class SlipMonitor(LeafSystem):
             for a wheel in the air. In the order of robot.yaml.
         normal_forces (n_wheels): load of each wheel [N].
         contact_forces (3 n_wheels): force of the ground on each wheel in W, wheel by wheel x, y, z [N].
+        contact_points (3 n_wheels): where it acts, the mean of several contacts, in the same order [m].
     """
 
     def __init__(self, model: RobotModel) -> None:
@@ -43,6 +44,7 @@ class SlipMonitor(LeafSystem):
         self.DeclareVectorOutputPort("slip_speeds", count, self._calc_slip)
         self.DeclareVectorOutputPort("normal_forces", count, self._calc_loads)
         self.DeclareVectorOutputPort("contact_forces", 3 * count, self._calc_forces)
+        self.DeclareVectorOutputPort("contact_points", 3 * count, self._calc_points)
 
     def _calc_slip(self, context: Context, output: BasicVector) -> None:
         slip = np.zeros(output.size())
@@ -72,6 +74,17 @@ class SlipMonitor(LeafSystem):
                 if int(body) in self._wheel_of:
                     forces[self._wheel_of[int(body)]] += sign * info.contact_force()
         output.SetFromVector(forces.ravel())
+
+    def _calc_points(self, context: Context, output: BasicVector) -> None:
+        sums, loads = np.zeros((output.size() // 3, 3)), np.zeros(output.size() // 3)
+        contacts = self._contacts.Eval(context)
+        for index in range(contacts.num_point_pair_contacts()):
+            info = contacts.point_pair_contact_info(index)
+            for wheel in _wheels_in(info, self._wheel_of):
+                load = max(_normal_force(info), 1e-12)
+                sums[wheel] += load * info.contact_point()
+                loads[wheel] += load
+        output.SetFromVector((sums / np.where(loads > 0, loads, 1.0)[:, np.newaxis]).ravel())
 
 
 class RollResistance(LeafSystem):

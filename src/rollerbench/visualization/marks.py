@@ -172,11 +172,11 @@ def forces(recording: Recording, robot: Robot, motion: Motion, prefix: str) -> t
             shown = (rank == index) & (length > 0.02 * palette.FORCE_LENGTH * size)
             if shown.any():
                 position = np.where(shown[:, np.newaxis], tip, [0.0, 0.0, BURIED * size])
-                tracks[f"{prefix}forces/{part.name}_{index}"] = transform(_towards(up), position)
+                tracks[f"{prefix}forces/{part.name}_{index}"] = transform(towards(up), position)
     colors = (palette.FORCE, *palette.SLIP_COLORS)
-    arrow = _arrow(longest, palette.FORCE_WIDTH * size)
+    shape = arrow(longest, palette.FORCE_WIDTH * size)
     items = [
-        Item(frame=frame, name="arrow", shape=arrow, color=colors[int(frame.rpartition("_")[2])]) for frame in tracks
+        Item(frame=frame, name="arrow", shape=shape, color=colors[int(frame.rpartition("_")[2])]) for frame in tracks
     ]
     return items, tracks
 
@@ -215,7 +215,7 @@ def support(recording: Recording, robot: Robot, motion: Motion, prefix: str) -> 
             moved = np.linalg.norm((feet[index] - feet[since])[both], axis=-1).max(initial=0.0)
             if (stands[index] == stands[since]).all() and moved < 0.02 * size:
                 continue
-        corners = _hull(feet[since][stands[since]])
+        corners = hull(feet[since][stands[since]])
         if corners is not None:
             frame = f"{prefix}support/{len(tracks)}"
             shape = polygon(corners + np.array([0.0, 0.0, height_of("support", size)]))
@@ -252,7 +252,7 @@ def _force(recording: Recording, robot: Robot, name: str) -> Array:
     return np.column_stack([rotate(recording.q_xyt[:, 2], aside), recording.columns[f"{name}.force_z"]])
 
 
-def _towards(up: Array) -> Array:
+def towards(up: Array) -> Array:
     """Rotations (n, 3, 3) whose z axis points along unit vectors (n, 3)."""
     side = np.cross(up, [1.0, 0.0, 0.0])
     small = np.linalg.norm(side, axis=1) < 1e-3
@@ -266,7 +266,7 @@ def _towards(up: Array) -> Array:
     return np.stack([np.cross(y, up), y, up], axis=-1)
 
 
-def _arrow(length: float, width: float, corners: int = 10) -> Mesh:
+def arrow(length: float, width: float, corners: int = 10) -> Mesh:
     """An arrow along z whose tip is the origin; the ground hides what of its shaft lies below."""
     angle = np.linspace(0.0, 2 * np.pi, corners, endpoint=False)
     ring = np.column_stack([np.cos(angle), np.sin(angle)])
@@ -284,7 +284,7 @@ def _arrow(length: float, width: float, corners: int = 10) -> Mesh:
     return Mesh(vertices=vertices, faces=np.concatenate(faces))
 
 
-def _hull(points: Array) -> Array | None:
+def hull(points: Array) -> Array | None:
     """Corners (m, 3) of the convex hull of points (n, 3) seen from above, counter-clockwise; None on one line."""
     if len(points) < 3:
         return None

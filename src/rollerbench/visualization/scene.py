@@ -1,10 +1,8 @@
-"""The robot's surroundings in Meshcat, and the page that keeps a run."""
+"""A Meshcat server, and the robot's surroundings as plants have them drawn there."""
 
 import logging
-import math
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.geometry import (
     Box,
     Ellipsoid,
@@ -12,7 +10,6 @@ from pydrake.geometry import (
     MeshcatParams,
     MeshcatVisualizer,
     MeshcatVisualizerParams,
-    Rgba,
     SceneGraph,
 )
 from pydrake.math import RigidTransform
@@ -21,6 +18,7 @@ from pydrake.multibody.tree import RigidBody
 from pydrake.systems.framework import DiagramBuilder
 
 from rollerbench.description import Robot
+from rollerbench.errors import ResourceError
 from rollerbench.kinematics.bumps import Bumps
 
 GROUND_SIZE = 40
@@ -28,18 +26,30 @@ GROUND_SIZE = 40
 
 GROUND_COLOR = np.array([0.88, 0.89, 0.90, 1.0])
 BUMP_COLOR = np.array([0.72, 0.66, 0.58, 1.0])
-GRID_COLOR = Rgba(0.55, 0.60, 0.65, 1.0)
-REFERENCE_COLOR = Rgba(0.10, 0.45, 0.85, 1.0)
-SIMULATED_COLOR = Rgba(0.90, 0.45, 0.05, 1.0)
 
 
-def local_meshcat(host: str = "localhost") -> Meshcat:
-    """A Meshcat server that only this machine can reach, unless it is bound to another host."""
+def local_meshcat(host: str = "localhost", port: int | None = None) -> Meshcat:
+    """A Meshcat server that only this machine can reach, unless it is told otherwise.
+
+    Args:
+        host: Name or address of this machine to listen at; "*" for all that it has, so that others can look too.
+        port: Port to listen at, 0 or from 1024 to 65535; 0 for any free one, None for the first that is from 7000 on.
+
+    Raises:
+        ResourceError: it cannot listen there.
+    """
+    if port is not None and not (port == 0 or 1024 <= port <= 65535):
+        raise ResourceError(f"port = {port}: accepted: 0 for any that is free, or from 1024 to 65535")
     logger = logging.getLogger("drake")
     level = logger.level
-    logger.setLevel(logging.WARNING)  # Every run would announce an address that nobody needs.
+    logger.setLevel(logging.WARNING)  # Drake would announce the address, as the callers do.
     try:
-        return Meshcat(MeshcatParams(host=host, show_stats_plot=False))
+        return Meshcat(MeshcatParams(host=host, port=port, show_stats_plot=False))
+    except (RuntimeError, SystemExit) as error:
+        where = host if port is None else f"{host}, port {port}"
+        raise ResourceError(
+            f"cannot listen at {where}: accepted: a name or address of this machine, and a port that is free"
+        ) from error
     finally:
         logger.setLevel(level)
 
@@ -73,50 +83,6 @@ def add_meshcat(
     """Shows a scene graph's illustration geometry in Meshcat."""
     parameters = MeshcatVisualizerParams(publish_period=1 / frames_per_second)
     return MeshcatVisualizer.AddToBuilder(builder, scene_graph, meshcat, parameters)
-
-
-def dress_scene(meshcat: Meshcat, robot: Robot, reference_q_xyt: NDArray[np.float64]) -> None:
-    """Sets grid, reference path and camera for a run along a reference path (n, 3)."""
-    meshcat.SetProperty("/Grid", "visible", False)
-    meshcat.SetProperty("/Axes", "visible", False)
-    # Even light: the lamp that comes with Meshcat leaves a bright spot in the middle of dark ground.
-    meshcat.SetProperty("/Lights/SpotLight", "visible", False)
-    meshcat.SetProperty("/Lights/AmbientLight/<object>", "intensity", 1.1)
-    meshcat.SetProperty("/Background", "top_color", [0.93, 0.95, 0.98])
-    meshcat.SetProperty("/Background", "bottom_color", [0.80, 0.84, 0.90])
-    size = _size(robot)
-    _draw_grid(meshcat, size)
-    draw_path(meshcat, "reference", reference_q_xyt, REFERENCE_COLOR, lift=0.002 * size)
-    low, high = reference_q_xyt[:, :2].min(axis=0) - size, reference_q_xyt[:, :2].max(axis=0) + size
-    center, span = 0.5 * (low + high), float(np.max(high - low))
-    target = np.array([*center, -0.5 * robot.ground_height])
-    meshcat.SetCameraPose(target + span * np.array([-0.3, -0.5, 0.37]), target)
-
-
-def draw_path(
-    meshcat: Meshcat, name: str, q_xyt: NDArray[np.float64], color: Rgba, lift: float, points: int = 500
-) -> None:
-    """Draws the planar path of poses (n, 3) as a line a little over the ground."""
-    chosen = np.unique(np.linspace(0, len(q_xyt) - 1, points).astype(int))
-    line = np.column_stack([q_xyt[chosen, :2], np.full(len(chosen), lift)])
-    if len(line) > 1:
-        meshcat.SetLine(f"paths/{name}", line.T, 4.0, color)
-
-
-def _draw_grid(meshcat: Meshcat, size: float) -> None:
-    """Draws grid lines over the slab, a power of ten of metres apart, smaller than the robot."""
-    pitch = 10.0 ** math.floor(math.log10(size))
-    count = 4 * math.ceil(0.0625 * GROUND_SIZE * size / pitch)
-    # In pieces of four cells: with software rendering, a line that ends behind the camera vanishes.
-    offset, start = (
-        pitch * indices.ravel()
-        for indices in np.meshgrid(np.arange(-count, count + 1), np.arange(-count, count, 4), indexing="ij")
-    )
-    end = start + 4 * pitch
-    height = np.full_like(offset, 0.001 * size)
-    starts = np.column_stack([np.stack([offset, start, height]), np.stack([start, offset, height])])
-    ends = np.column_stack([np.stack([offset, end, height]), np.stack([end, offset, height])])
-    meshcat.SetLineSegments("grid", starts, ends, 1.0, GRID_COLOR)
 
 
 def _size(robot: Robot) -> float:

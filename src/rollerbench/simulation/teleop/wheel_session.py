@@ -6,7 +6,7 @@ import numpy as np
 from pydrake.geometry import Meshcat
 
 from rollerbench.kinematics.odometry import rotate
-from rollerbench.simulation.drake_engine import stand_at_rest
+from rollerbench.simulation.drake_engine import start_at_rest
 from rollerbench.simulation.scenario import Scenario
 from rollerbench.simulation.station import Station
 from rollerbench.simulation.teleop.desk import Message
@@ -106,7 +106,7 @@ class WheelSession(Session):
 
     def _place(self) -> None:
         self._set_inputs()
-        stand_at_rest(self._simulator, self._station, self.scenario)
+        start_at_rest(self._simulator, self._station, self.scenario)
 
     def _forget(self) -> None:
         self.told = self.driver.start()
