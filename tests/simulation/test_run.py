@@ -42,6 +42,7 @@ def test_the_folder_is_complete(folder: Path) -> None:
         "recording.parquet",
         "summary.json",
         "recording.html",
+        "preview.png",
         "report.html",
         "figures/trajectory.svg",
         "figures/pose_error.svg",

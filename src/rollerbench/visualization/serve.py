@@ -1,11 +1,11 @@
 """A page on a port of this machine."""
 
 import asyncio
+import errno
 import socket
 from collections.abc import Callable
 
 from tornado.httpserver import HTTPServer
-from tornado.netutil import bind_sockets
 from tornado.web import Application, RequestHandler
 
 from rollerbench.errors import ResourceError
@@ -25,13 +25,32 @@ def listen(host: str, port: int) -> tuple[list[socket.socket], str]:
         ResourceError: the port cannot be had.
     """
     try:
-        sockets = bind_sockets(port, None if host in EVERYWHERE else host)
+        sockets = _listening(None if host in EVERYWHERE else host, port)
     except (OSError, OverflowError) as error:
         raise ResourceError(
             f"--host {host} --port {port}: {error}; accepted: an address of this machine, and a free port (0 for any)"
         ) from error
     name = "localhost" if host in EVERYWHERE else f"[{host}]" if ":" in host else host
     return sockets, f"http://{name}:{sockets[0].getsockname()[1]}/"
+
+
+def _listening(host: str | None, port: int) -> list[socket.socket]:
+    """Sockets at all addresses of a host, at one port."""
+    found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
+    sockets: list[socket.socket] = []
+    for family, address in dict.fromkeys((family, str(address[0])) for family, *_, address in found):
+        at = sockets[0].getsockname()[1] if sockets else port
+        try:
+            sockets.append(socket.create_server((address, at), family=family))
+        except OSError as error:
+            # Where the machine has no IPv6, its name may still have such an address.
+            if sockets and error.errno in (errno.EADDRNOTAVAIL, errno.EAFNOSUPPORT):
+                continue
+            for each in sockets:
+                each.close()
+            raise
+        sockets[-1].setblocking(False)
+    return sockets
 
 
 class _Page(RequestHandler):

@@ -1,10 +1,8 @@
 """The page's server: a few files, and one WebSocket."""
 
 import asyncio
-import errno
 import itertools
 import json
-import socket
 import threading
 import time
 from collections.abc import Iterator
@@ -16,8 +14,8 @@ from tornado.httpserver import HTTPServer
 from tornado.web import Application, RequestHandler
 from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
-from rollerbench.errors import RollerbenchError
 from rollerbench.simulation.teleop.desk import Desk, Message
+from rollerbench.visualization.serve import listen
 
 FILES = {
     "": ("page.html", "text/html"),
@@ -32,8 +30,6 @@ LOCAL = ("localhost", "127.0.0.1", "::1")
 
 LOCAL_NAMES = r"^(localhost|127\.0\.0\.1|\[::1\])$"
 """Names under which a server for this machine answers: a foreign page that had its own name lead here gets nothing."""
-
-EVERYWHERE = ("", "*", "0.0.0.0", "::")
 
 UNSUPPORTED = 1003
 """WebSocket's code for data that cannot be accepted."""
@@ -55,21 +51,13 @@ class Server:
             port: Port, 0 for any that is free.
 
         Raises:
-            RollerbenchError: the port cannot be had.
+            ResourceError: the port cannot be had.
         """
         self.desk = desk
         self.hello: dict[str, Any] = {}
         self.clients: dict[int, Channel] = {}
         self.numbers: Iterator[int] = itertools.count(1)
-        try:
-            self._sockets = _listening(None if host in EVERYWHERE else host, port)
-        except OSError as error:
-            raise RollerbenchError(
-                f"--host {host} --port {port}: {error}; accepted: a host of this machine, and a port that is free "
-                "(0 for any)"
-            ) from error
-        name = "localhost" if host in EVERYWHERE else f"[{host}]" if ":" in host else host
-        self.url = f"http://{name}:{self._sockets[0].getsockname()[1]}/"
+        self._sockets, self.url = listen(host, port)
         self._names = LOCAL_NAMES if host in LOCAL else r".*"
         self._loop = asyncio.new_event_loop()
         self._stopping = asyncio.Event()
@@ -119,25 +107,6 @@ class Server:
         for client in list(self.clients.values()):
             client.close(1001, "the simulation ended")
         await http.close_all_connections()
-
-
-def _listening(host: str | None, port: int) -> list[socket.socket]:
-    """Sockets at all addresses of a host, at one port."""
-    found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
-    sockets: list[socket.socket] = []
-    for family, address in dict.fromkeys((family, str(address[0])) for family, *_, address in found):
-        at = sockets[0].getsockname()[1] if sockets else port
-        try:
-            sockets.append(socket.create_server((address, at), family=family))
-        except OSError as error:
-            # Where the machine has no IPv6, its name may still have such an address.
-            if sockets and error.errno in (errno.EADDRNOTAVAIL, errno.EAFNOSUPPORT):
-                continue
-            for each in sockets:
-                each.close()
-            raise
-        sockets[-1].setblocking(False)
-    return sockets
 
 
 class Page(RequestHandler):

@@ -14,11 +14,12 @@ from rollerbench.description import Robot
 from rollerbench.errors import RollerbenchError
 from rollerbench.simulation.teleop.desk import Desk, Order
 from rollerbench.simulation.teleop.leg_session import LegSession
-from rollerbench.simulation.teleop.server import EVERYWHERE, Server
+from rollerbench.simulation.teleop.server import Server
 from rollerbench.simulation.teleop.session import PERIOD, Session, teleop_scenario
 from rollerbench.simulation.teleop.wheel_session import WheelSession
 from rollerbench.visualization.live_scene import LiveScene
 from rollerbench.visualization.scene import local_meshcat
+from rollerbench.visualization.serve import EVERYWHERE
 
 FRAME_TIME, STATE_TIME = 1 / 30, 1 / 15
 """Times between two pictures, and between two states that pages are told [s]."""
