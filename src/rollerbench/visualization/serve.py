@@ -28,7 +28,7 @@ def listen(host: str, port: int) -> tuple[list[socket.socket], str]:
         sockets = _listening(None if host in EVERYWHERE else host, port)
     except (OSError, OverflowError) as error:
         raise ResourceError(
-            f"--host {host} --port {port}: {error}; accepted: an address of this machine, and a free port (0 for any)"
+            f"--host {host} --port {port}: {error}; accepted: a host of this machine, and a port that is free (0: any)"
         ) from error
     name = "localhost" if host in EVERYWHERE else f"[{host}]" if ":" in host else host
     return sockets, f"http://{name}:{sockets[0].getsockname()[1]}/"
