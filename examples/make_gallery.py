@@ -45,7 +45,7 @@ def main() -> None:
             summary=result.summary,
         )
         started = time.perf_counter()
-        picture = preview(scene_of([seen]), width=640, height=360)
+        picture = preview(scene_of([seen], forces=True, slip=True), width=640, height=360)
         file = arguments.output / robot / "preview.png"
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_bytes(picture)
