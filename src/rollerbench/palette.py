@@ -64,3 +64,8 @@ GROUND_MARGIN = 2.5
 LIFT = 0.002
 """Between marks on the ground that lie over each other, so that they do not flicker."""
 GROUND_THICKNESS = 0.05
+
+
+def css(color: Color) -> str:
+    """A colour as style sheets and figures have it, such as #0072b2."""
+    return "#" + "".join(f"{round(255 * value):02x}" for value in color)

@@ -8,15 +8,18 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from rollerbench import analysis
+from rollerbench import analysis, palette
+from rollerbench.palette import css
 from rollerbench.recording import Recording
 from rollerbench.report.legs_drawn import leg_figures
-from rollerbench.report.panels import Look, at_least, looks, new_panels, panels_text, plot, plot_path
+from rollerbench.report.panels import Look, at_least, looks, new_panels, panels_text, plot, plot_path, run_looks
 
 Drawn = tuple[Figure, list[Axes]]
 """A figure and its panels."""
 
-REFERENCE = Look(color="#000000", style="--")
+REFERENCE = Look(color=css(palette.REFERENCE), style="--")
+
+ODOMETRY = Look(color="#009E73", style=":")
 
 NOTHING = 1e-3
 """Errors that are smaller are drawn as none [mm, deg]."""
@@ -76,7 +79,7 @@ def trajectory(recordings: Mapping[str, Recording]) -> Drawn:
     curves = 3 * len(recordings)
     paths = [recording.reference_q_xyt[:, :2] for recording in recordings.values()]
     same = all(path.shape == paths[0].shape and np.allclose(path, paths[0], atol=1e-9) for path in paths)
-    for (name, recording), look in zip(recordings.items(), looks(), strict=False):
+    for (name, recording), look in zip(recordings.items(), run_looks(), strict=False):
         if not same:
             own = Look(color=look.color, style=":")
             plot_path(axes, recording.reference_q_xyt[:, :2], own, f"{name}: reference", curves=curves, width=1.0)
@@ -84,8 +87,7 @@ def trajectory(recordings: Mapping[str, Recording]) -> Drawn:
     if same:
         plot_path(axes, paths[0], REFERENCE, "reference", curves=curves, width=1.0)
     if len(recordings) == 1:
-        odometry = Look(color="#009E73", style=":")
-        plot_path(axes, recording.odometry_q_xyt[:, :2], odometry, "odometry", curves=curves)
+        plot_path(axes, recording.odometry_q_xyt[:, :2], ODOMETRY, "odometry", curves=curves)
     axes.update_datalim(recording.q_xyt[0, :2] + [[-SHORTEST, -SHORTEST], [SHORTEST, SHORTEST]])
     axes.set_aspect("equal", adjustable="datalim")
     return figure, [axes]
@@ -101,7 +103,8 @@ def pose_error(recordings: Mapping[str, Recording]) -> Drawn:
     lines = [(name or "simulated", recording, recording.q_xyt) for name, recording in recordings.items()]
     if len(recordings) == 1:
         lines += [("odometry", recording, recording.odometry_q_xyt) for recording in recordings.values()]
-    for (name, recording, poses), look in zip(lines, looks(), strict=False):
+    shown = chain(islice(run_looks(), len(recordings)), [ODOMETRY])
+    for (name, recording, poses), look in zip(lines, shown, strict=False):
         error = (poses - recording.reference_q_xyt) * [1e3, 1e3, np.degrees(1.0)]
         for axes, values in zip(panels, error.T, strict=True):
             plot(axes, recording.time, values, look, name, curves=3 * len(lines))

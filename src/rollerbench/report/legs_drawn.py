@@ -4,10 +4,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from rollerbench.palette import REFERENCE, css
 from rollerbench.recording import Recording
-from rollerbench.report.panels import Look, at_least, looks, new_panels, plot
+from rollerbench.report.panels import Look, at_least, looks, new_panels, plot, run_looks
 
-DESIRED = Look(color="#000000", style="--")
+DESIRED = Look(color=css(REFERENCE), style="--")
 
 
 def leg_figures(recording: Recording) -> dict[str, tuple[Figure, list[Axes]]]:
@@ -24,7 +25,7 @@ def body(recording: Recording) -> tuple[Figure, list[Axes]]:
     """Height and inclination of the body over time, as they are and as they should be."""
     labels = ("height of the body [mm]", "roll [deg]", "pitch [deg]")
     figure, panels = new_panels(labels, "time [s]", height=1.2)
-    simulated = next(looks())
+    simulated = next(run_looks())
     for axes, name, scale, span in zip(panels, ("z", "roll", "pitch"), (1e3, *[np.degrees(1.0)] * 2), (1.0, 0.1, 0.1),
                                        strict=True):  # fmt: skip
         plot(axes, recording.time, scale * recording.columns[name], simulated, "simulated", curves=6)

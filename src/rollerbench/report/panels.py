@@ -12,6 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator, ScalarFormatter
 from numpy.typing import NDArray
 
+from rollerbench.palette import RUNS, css
 from rollerbench.report.drawing import COLORS, STYLES, svg_text
 
 Array = NDArray[np.float64]
@@ -43,6 +44,12 @@ class Look:
 
     color: str
     style: str
+
+
+def run_looks() -> Iterator[Look]:
+    """Looks of what was simulated, of one run after the other, in the colours that scenes have for them."""
+    for index in count():
+        yield Look(color=css(RUNS[index % len(RUNS)]), style=STYLES[index % len(STYLES)])
 
 
 def looks() -> Iterator[Look]:

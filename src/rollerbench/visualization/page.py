@@ -46,8 +46,8 @@ def scene_page(scene: Scene) -> str:
         settings=Markup(_inert(json.dumps(_settings(scene)))),
         marks=_marks(scene),
         grid="0.1 m" if scene.pitch < 1 else "1 m",
-        simulated=_css(palette.SIMULATED),
-        reference=_css(palette.REFERENCE),
+        simulated=palette.css(palette.SIMULATED),
+        reference=palette.css(palette.REFERENCE),
     )
 
 
@@ -172,7 +172,7 @@ def _legend(scene: Scene, run: SceneRun) -> dict[str, Any]:
     return {
         "name": run.name,
         "robot": run.robot,
-        "color": _css(run.color),
+        "color": palette.css(run.color),
         "lines": lines,
         "failure": summary["failure"],
     }
@@ -186,14 +186,14 @@ def _marks(scene: Scene) -> dict[str, Any]:
         "forces": any("forces/" in path for path in scene.tracks),
         "loads": any("feet" in frame for frame in frames),
         "slip": [
-            (f"over {1e3 * speed:g} mm/s", _css(color))
+            (f"over {1e3 * speed:g} mm/s", palette.css(color))
             for speed, color in zip(palette.SLIP_SPEEDS, palette.SLIP_COLORS, strict=True)
         ],
         "has_slip": slip,
         "support": any("support/" in path for path in scene.tracks),
         "shown": scene.shown,
-        "support_color": _css(palette.SUPPORT),
-        "force_color": _css(palette.FORCE),
+        "support_color": palette.css(palette.SUPPORT),
+        "force_color": palette.css(palette.FORCE),
     }
 
 
@@ -229,7 +229,3 @@ def _inert(text: str) -> str:
 def _integer(color: Color) -> int:
     red, green, blue = (round(255 * value) for value in color)
     return 65536 * red + 256 * green + blue
-
-
-def _css(color: Color) -> str:
-    return f"#{_integer(color):06x}"
