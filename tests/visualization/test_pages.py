@@ -31,7 +31,7 @@ def _near(pixels: np.ndarray, color: tuple[float, float, float], tolerance: floa
 
 
 def test_the_recording_plays_offline_from_the_start_with_its_numbers(folder: Path) -> None:
-    with opened(folder / "recording.html", 1000, 700) as watched:
+    with opened(folder / "recording.html", 760, 480) as watched:
         page = watched.page
         page.wait_for_function("!animator.playing && animator.time > 0.999", timeout=60_000)
         assert page.evaluate("animator.duration") == pytest.approx(1.0, abs=1e-6)
@@ -48,7 +48,7 @@ def test_the_recording_plays_offline_from_the_start_with_its_numbers(folder: Pat
         started = _pixels(page.screenshot())
         assert watched.requests == []
         assert watched.errors == []
-    ground = ended[-250:-80]
+    ground = ended[-200:-80]
     assert (np.ptp(ground, axis=-1) < 0.15).mean() > 0.6
     assert ground.std() > 0.005  # grid lines
     assert _near(ended, palette.SIMULATED, 0.05).sum() > 100  # heading arrow and trail
@@ -57,7 +57,7 @@ def test_the_recording_plays_offline_from_the_start_with_its_numbers(folder: Pat
 
 def test_cameras_and_marks_can_be_chosen(folder: Path) -> None:
     """Top looks down, follow keeps the robot in the middle, and a check box hides the ghost."""
-    with opened(folder / "recording.html", 1000, 700) as watched:
+    with opened(folder / "recording.html", 760, 480) as watched:
         page = watched.page
         page.wait_for_function("animator.duration > 0")
         page.evaluate("animator.pause()")
@@ -91,7 +91,7 @@ def test_ghost_and_robot_are_apart_when_errors_are_injected_and_coincide_when_no
         "recording": {"camera": "top"},
     }
     result = rb.run(scenario, output=tmp_path / "run")
-    with opened(tmp_path / "run" / "recording.html", 1000, 700) as watched:
+    with opened(tmp_path / "run" / "recording.html", 760, 480) as watched:
         page = watched.page
         page.wait_for_function("animator.duration > 0")
         page.uncheck("[data-shows=trails]")

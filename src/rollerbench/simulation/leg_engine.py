@@ -31,6 +31,8 @@ def simulate(
     Raises:
         DescriptionError: the legs cannot do what they are asked, or Drake refuses a setting.
     """
+    # Ideal legs rehearse the command, and refuse what they cannot do before anything is simulated.
+    _ = scenario.rehearsal
     station = LegStation(scenario, meshcat=meshcat, log=True, visuals=meshcat is not None)
     simulator = Simulator(station)
     configure(simulator, scenario)

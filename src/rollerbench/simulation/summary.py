@@ -41,7 +41,7 @@ def summarize(
         "versions": versions(),
         "duration": duration,
         "wall_time": simulated.wall_time,
-        "realtime_factor": duration / simulated.wall_time,
+        "realtime_factor": duration / simulated.wall_time if simulated.wall_time else 0.0,
         "path_length": path_length(recording),
         "rotation": rotation(recording),
         "reference_final_pose": _pose(recording.reference_q_xyt),

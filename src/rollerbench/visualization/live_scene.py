@@ -149,4 +149,4 @@ def _even_light(meshcat: Meshcat) -> None:
     meshcat.SetProperty("/Lights/AmbientLight/<object>", "intensity", 2.7)
     meshcat.SetProperty("/Lights/FillLight/<object>", "intensity", 1.2)
     for name, color in zip(("top_color", "bottom_color"), palette.SKY, strict=True):
-        meshcat.SetProperty("/Background", name, list(color))
+        meshcat.SetProperty("/Background/<object>", name, list(color))
