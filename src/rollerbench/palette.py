@@ -18,6 +18,9 @@ RUNS: tuple[Color, ...] = (
 )
 """Of several runs in one scene, in turn."""
 
+HEADING: Color = (0.10, 0.10, 0.12)
+"""Of the heading arrow on a body that has the colour of its run."""
+
 BODY: Color = (0.30, 0.34, 0.40)
 HUB: Color = (0.42, 0.43, 0.46)
 TYRE: Color = (0.12, 0.12, 0.13)
@@ -36,12 +39,12 @@ STEP: Color = (0.62, 0.66, 0.70)
 SKY: tuple[Color, Color] = ((0.99, 0.99, 1.0), (0.86, 0.89, 0.93))
 """Background, at the top and at the bottom."""
 
-FORCE: Color = (0.0, 0.45, 0.70)
-SLIP_COLORS: tuple[Color, ...] = ((0.94, 0.89, 0.26), (0.90, 0.62, 0.0), (0.75, 0.15, 0.05))
+FORCE: Color = (0.0, 0.50, 0.36)
+SLIP_COLORS: tuple[Color, ...] = ((0.85, 0.70, 0.0), (0.78, 0.22, 0.45), (0.25, 0.0, 0.20))
 """Of wheels that slide faster than `SLIP_SPEEDS`."""
 SLIP_SPEEDS = (0.01, 0.05, 0.2)
 """Speeds over the ground from which a wheel counts as sliding a little, much, and altogether [m/s]."""
-SUPPORT: Color = (0.0, 0.62, 0.45)
+SUPPORT: Color = (0.50, 0.72, 0.25)
 FOOTHOLD: Color = (0.35, 0.55, 0.48)
 
 GHOST_OPACITY = 0.28
@@ -57,7 +60,8 @@ SKID_WIDTH = 0.035
 ARROW_LENGTH = 0.30
 ARROW_WIDTH = 0.10
 FORCE_LENGTH = 0.25
-"""Of the arrow of a wheel that carries its share of the weight."""
+"""Of the arrow of a wheel that carries its share of the weight; at least `FORCE_REACH` wheels high."""
+FORCE_REACH = 1.6
 FORCE_WIDTH = 0.018
 GROUND_MARGIN = 2.5
 """How far the ground reaches beyond the path."""

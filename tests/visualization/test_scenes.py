@@ -1,6 +1,7 @@
 """A scene shows robots where their recordings say, and marks where it happened."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -112,6 +113,28 @@ def test_wheels_turn_by_their_angles(sliding: SeenRun) -> None:
         np.testing.assert_allclose(turn[:, 0, 2], np.sin(angle), atol=1e-9)
 
 
+def test_wheels_faster_than_frames_are_seen_turning_the_right_way(sliding: SeenRun) -> None:
+    """Viewers go the shorter way between two frames: there are as many as that needs."""
+    columns = {
+        name: 40 * values if name.endswith(".angle") else values for name, values in sliding.recording.columns.items()
+    }
+    fast = replace(sliding.recording, columns=columns)
+    motion = motion_of(fast, robot_of(fast), frames_per_second=5)
+    turns = [np.abs(np.diff(angle)).max() for angle in motion.angles.values()]
+    assert 1.0 < max(turns) < math.pi
+    assert max(np.abs(np.diff(angle)).max() for name, angle in columns.items() if name.endswith(".angle")) < math.pi
+    assert len(motion.time) > 12
+
+
+@pytest.mark.parametrize(
+    ("size", "extent", "expected"),
+    [(0.05, 2, [0.1, 1]), (0.6, 6, [0.1, 1]), (12, 80, [10, 100]), (1, 2000, [100, 1000])],
+)
+def test_the_grid_suits_robot_and_path(size: float, extent: float, expected: list[float]) -> None:
+    """Neither finer than a tenth of the robot nor more lines than one can see."""
+    assert marks.grid_pitches(np.zeros(2), np.array([extent, 1.0]), size) == pytest.approx(expected)
+
+
 def test_forces_bear_the_weight_and_stand_where_wheels_touch(sliding: SeenRun) -> None:
     """The recorded forces of a robot on level ground carry its weight on the mean, and slide within friction."""
     recording, robot = sliding.recording, rb.load_robot("youbot_base")
@@ -154,19 +177,20 @@ def test_slip_is_drawn_where_and_as_fast_as_wheels_slid(sliding: SeenRun) -> Non
 
 
 def test_the_support_polygon_has_the_feet_that_stand(walking: SeenRun) -> None:
-    """At every frame one polygon is seen, and its corners are feet on the ground."""
+    """At every frame one polygon is seen, and its corners are feet that bear a load."""
     recording, robot = walking.recording, robot_of(walking.recording)
     motion = motion_of(recording, robot, 30.0)
     items, tracks = marks.support(recording, robot, motion, "")
     seen_now = np.array([track[:, 2, 3] == 0 for track in tracks.values()])
-    assert (seen_now.sum(axis=0) == 1).all()
+    assert (seen_now.sum(axis=0) <= 1).all()
+    assert seen_now.sum(axis=0).mean() > 0.9
     for item, shown in zip(items, seen_now, strict=True):
         assert isinstance(item.shape, Mesh)
         first = motion.samples[np.argmax(shown)]
         feet = [
             [recording.columns[f"{leg.name}.foot_{axis}"][first] for axis in "xy"]
             for leg in robot.legs
-            if recording.columns[f"{leg.name}.stance"][first] > 0.5
+            if recording.columns[f"{leg.name}.load"][first] > 1.0
         ]
         apart = np.linalg.norm(item.shape.vertices[:, np.newaxis, :2] - np.array(feet), axis=-1)
         assert apart.min(axis=1).max() < 1e-12

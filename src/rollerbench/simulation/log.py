@@ -92,7 +92,11 @@ def ground_of(scenario: Scenario) -> dict[str, Any]:
     if bumps is not None:
         places = {"centers": bumps.centers_W[:, :2], "half_widths": bumps.half_widths, "heights": bumps.heights}
         caps = {name: values.tolist() for name, values in places.items()}
-    return {"steps": [step.model_dump() for step in scenario.ground.steps], "bumps": caps}
+    return {
+        "slope_deg": scenario.ground.slope_deg,
+        "steps": [step.model_dump() for step in scenario.ground.steps],
+        "bumps": caps,
+    }
 
 
 def versions() -> dict[str, str]:

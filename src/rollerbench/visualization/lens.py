@@ -59,7 +59,7 @@ def whole(scene: Scene) -> Array:
 
 def near(scene: Scene, time: float) -> Array:
     """Points (n, 3) round robots and ghosts at a time [s], and of the trails about them."""
-    bodies = _corners(scene, time / scene.duration)
+    bodies = _corners(scene, (time / scene.duration if scene.duration else 0.0))
     middle = 0.5 * (bodies.min(axis=0) + bodies.max(axis=0))
     radius = np.linalg.norm(bodies - middle, axis=1).max()
     trails = _trails(scene)

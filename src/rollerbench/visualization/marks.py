@@ -28,10 +28,16 @@ LAYERS = ("ground", "fine_grid", "grid", "footholds", "reference", "simulated", 
 """What lies on the ground, from below."""
 
 TRAIL_POINTS = 500
+PITCHES = tuple(10.0**power for power in range(-3, 7))
+"""Distances that a grid's lines may have [m]."""
+
 FINE_LINES = 160
-"""Of at most so many lines each way the fine grid is drawn."""
+"""Most lines of a grid, each way."""
 
 AXLE = Rotation.from_euler("x", 90, degrees=True).as_matrix()
+BEARS = 0.005
+"""Share of the weight from which a foot counts as bearing a load [-]."""
+
 BURIED = -1000.0
 """Height at which what is not to be seen waits, over the size of the robot [-]."""
 
@@ -47,21 +53,29 @@ def height_of(layer: str, size: float) -> float:
 
 
 def ground(low: Array, high: Array, size: float) -> list[Item]:
-    """Ground with a grid of metres, and of decimetres for small robots, beyond low (2,) and high (2,)."""
+    """Ground with a grid (`grid_pitches`), reaching beyond paths from low (2,) to high (2,)."""
     low, high = np.floor(low - palette.GROUND_MARGIN * size), np.ceil(high + palette.GROUND_MARGIN * size)
     extent, center = high - low, 0.5 * (low + high)
     thickness = palette.GROUND_THICKNESS * size
     slab = Box(size=(extent[0], extent[1], thickness))
     pose = transform(np.eye(3), np.array([*center, height_of("ground", size) - 0.5 * thickness]))
     items = [Item(frame=WORLD, name="slab", shape=slab, color=palette.GROUND, X_FG=pose, lit=False)]
-    for layer, pitch, width, color in (
-        ("fine_grid", 0.1, 0.004 * size, palette.FINE_GRID),
-        ("grid", 1.0, 0.008 * size, palette.GRID),
+    for layer, pitch, width, color in zip(
+        ("grid", "fine_grid"),
+        reversed(grid_pitches(low, high, size)),
+        (0.008 * size, 0.004 * size),
+        (palette.GRID, palette.FINE_GRID),
+        strict=False,
     ):
-        if pitch >= 0.1 * size and extent.max() / pitch <= FINE_LINES:
-            mesh = _lines(low, high, pitch, width, height_of(layer, size))
-            items.append(Item(frame=WORLD, name=layer, shape=mesh, color=color, lit=False))
+        mesh = _lines(low, high, pitch, width, height_of(layer, size))
+        items.append(Item(frame=WORLD, name=layer, shape=mesh, color=color, lit=False))
     return items
+
+
+def grid_pitches(low: Array, high: Array, size: float) -> list[float]:
+    """Distances of the grid's lines on ground from low (2,) to high (2,), at most two, the finer one first [m]."""
+    extent = float(np.max(np.subtract(high, low)))
+    return [pitch for pitch in PITCHES if pitch >= 0.1 * size and extent / pitch <= FINE_LINES][:2]
 
 
 def bumps(centers: Array, half_widths: Array, heights: Array) -> list[Item]:
@@ -86,6 +100,7 @@ def steps(places: Sequence[Mapping[str, float]], width: float) -> list[Item]:
             name=f"step_{index}",
             shape=Box(size=(step["end"] - step["start"], width, step["height"])),
             color=palette.STEP,
+            lit=False,
             X_FG=transform(np.eye(3), np.array([0.5 * (step["start"] + step["end"]), 0.0, 0.5 * step["height"]])),
         )
         for index, step in enumerate(places)
@@ -122,10 +137,10 @@ def heading(robot: Robot, frame: str, color: Color) -> Item:
 
 
 def trail(points: Array, layer: str, color: Color, size: float, name: str) -> list[Item]:
-    """A band along a path (n, 2) on the ground; of the reference a wider one."""
+    """A band along a path (n, 3) on the ground; of the reference a wider one."""
     width = palette.REFERENCE_TRAIL_WIDTH if layer == "reference" else palette.TRAIL_WIDTH
     chosen = points[np.unique(np.linspace(0, len(points) - 1, TRAIL_POINTS).astype(int))]
-    mesh = ribbon(chosen, width * size, height_of(layer, size))
+    mesh = ribbon(chosen[:, :2], width * size, chosen[:, 2] + height_of(layer, size))
     return [] if mesh is None else [Item(frame="trails", name=name, shape=mesh, color=color, lit=False)]
 
 
@@ -140,7 +155,7 @@ def skid_marks(recording: Recording, robot: Robot, prefix: str) -> list[Item]:
             if rank[start]:
                 points = place[start : end + 1]
                 thin = points[np.unique(np.linspace(0, len(points) - 1, TRAIL_POINTS).astype(int))]
-                mesh = ribbon(thin, palette.SKID_WIDTH * size, height)
+                mesh = ribbon(thin[:, :2], palette.SKID_WIDTH * size, thin[:, 2] + height)
                 pieces[rank[start] - 1] += [] if mesh is None else [mesh]
     meshes = [merged(each) for each in pieces]
     return [
@@ -148,6 +163,12 @@ def skid_marks(recording: Recording, robot: Robot, prefix: str) -> list[Item]:
         for speed, color, mesh in zip(palette.SLIP_SPEEDS, palette.SLIP_COLORS, meshes, strict=True)
         if mesh is not None
     ]
+
+
+def force_length(robot: Robot) -> float:
+    """Length of the arrow of a wheel or foot that carries its share of the weight [m]: no wheel hides it."""
+    radius = max(part.radius for part in (*robot.wheels, *(leg.wheel for leg in robot.legs)))
+    return max(palette.FORCE_LENGTH * size_of(robot), palette.FORCE_REACH * 2 * radius)
 
 
 def has_forces(recording: Recording, robot: Robot) -> bool:
@@ -160,13 +181,13 @@ def forces(recording: Recording, robot: Robot, motion: Motion, prefix: str) -> t
     size = size_of(robot)
     parts = robot.wheels or robot.legs
     longest, items, tracks = 0.0, [], {}
-    scale = palette.FORCE_LENGTH * size * len(parts) / (robot.mass * GRAVITY)
+    scale = force_length(robot) * len(parts) / (robot.mass * GRAVITY)
     for part, (place, slip) in zip(parts, _contacts(recording, robot), strict=True):
         force = _force(recording, robot, part.name)[motion.samples]
         length = scale * np.linalg.norm(force, axis=1)
         longest = max(longest, float(length.max()))
         up = force / np.maximum(np.linalg.norm(force, axis=1, keepdims=True), 1e-9)
-        tip = np.column_stack([place[motion.samples], np.zeros(len(up))]) + length[:, np.newaxis] * up
+        tip = place[motion.samples] + length[:, np.newaxis] * up
         rank = np.searchsorted(palette.SLIP_SPEEDS, slip[motion.samples], side="right")
         for index in range(len(palette.SLIP_SPEEDS) + 1):
             shown = (rank == index) & (length > 0.02 * palette.FORCE_LENGTH * size)
@@ -199,10 +220,11 @@ def footholds(recording: Recording, robot: Robot, prefix: str) -> list[Item]:
 
 
 def support(recording: Recording, robot: Robot, motion: Motion, prefix: str) -> tuple[list[Item], dict[str, Array]]:
-    """The polygon of the feet that stand, a new one whenever it changes; items and tracks."""
+    """The polygon of the feet that bear a load, a new one whenever it changes; items and tracks."""
     size = size_of(robot)
     names = [leg.name for leg in robot.legs]
-    stands = np.column_stack([recording.columns[f"{name}.stance"] for name in names])[motion.samples] > 0.5
+    loads = np.column_stack([recording.columns[f"{name}.load"] for name in names])[motion.samples]
+    stands = loads > BEARS * robot.mass * GRAVITY
     feet = np.stack(
         [np.column_stack([recording.columns[f"{name}.foot_{axis}"] for axis in "xyz"]) for name in names], axis=1
     )[motion.samples]
@@ -229,16 +251,18 @@ def support(recording: Recording, robot: Robot, motion: Motion, prefix: str) -> 
 
 
 def _contacts(recording: Recording, robot: Robot) -> list[tuple[Array, Array]]:
-    """Where each wheel or foot touches the ground (n, 2), and how fast it slides there (n,); NaN in the air."""
+    """Where each wheel or foot touches the ground (n, 3), and how fast it slides there (n,); 0 in the air."""
     columns, found = recording.columns, []
     for leg in robot.legs:
         slip = np.hypot(columns[f"{leg.name}.slip_x"], columns[f"{leg.name}.slip_y"])
-        place = np.column_stack([columns[f"{leg.name}.foot_x"], columns[f"{leg.name}.foot_y"]])
+        place = np.column_stack([columns[f"{leg.name}.foot_{axis}"] for axis in "xyz"])
+        place[:, 2] = np.maximum(place[:, 2], 0.0)
         found.append((place, np.where(columns[f"{leg.name}.load"] > 0, slip, 0.0)))
     for wheel in robot.wheels:
         slip = np.hypot(columns[f"{wheel.name}.slip_x"], columns[f"{wheel.name}.slip_y"])
         aside = np.column_stack([columns[f"{wheel.name}.contact_x"], columns[f"{wheel.name}.contact_y"]])
         place = recording.q_xyt[:, :2] + rotate(recording.q_xyt[:, 2], aside)
+        place = np.column_stack([place, np.zeros(len(place))])
         found.append((place, np.where(columns[f"{wheel.name}.depth"] >= 0, slip, 0.0)))
     return found
 

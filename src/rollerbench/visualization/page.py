@@ -28,6 +28,9 @@ Command = dict[str, Any]
 AXLE = Rotation.from_euler("x", 90, degrees=True).as_matrix()
 """Turns the viewer's cylinders, which lie along y, onto z."""
 
+LEAP = 10.0
+"""Distance between two frames that nothing drives [m]."""
+
 SEGMENTS = 32
 """Of round shapes."""
 
@@ -45,7 +48,8 @@ def scene_page(scene: Scene) -> str:
         runs=[_legend(scene, run) for run in scene.runs],
         settings=Markup(_inert(json.dumps(_settings(scene)))),
         marks=_marks(scene),
-        grid="0.1 m" if scene.pitch < 1 else "1 m",
+        grid=" and ".join(f"{pitch:g} m" for pitch in scene.pitches) or "none",
+        slope=scene.slope_deg,
         simulated=palette.css(palette.SIMULATED),
         reference=palette.css(palette.REFERENCE),
     )
@@ -89,11 +93,18 @@ def _animation(path: str, times: Array, track: Array) -> Command:
     turns = Rotation.from_matrix(track[:, :3, :3]).as_quat()
     tracks = []
     for name, kind, values in (("position", "vector3", track[:, :3, 3]), ("quaternion", "quaternion", turns)):
-        kept = _changes(values)
-        pairs = zip(times[kept].tolist(), values[kept].tolist(), strict=True)
+        of, shown = _held(times, values) if name == "position" else (times, values)
+        kept = _changes(shown)
+        pairs = zip(of[kept].tolist(), shown[kept].tolist(), strict=True)
         keys = [{"time": time, "value": value} for time, value in pairs]
         tracks.append({"name": f".{name}", "type": kind, "keys": keys})
     return {"path": f"/{path}", "clip": {"fps": 1, "name": "default", "tracks": tracks}}
+
+
+def _held(times: Array, values: Array) -> tuple[Array, Array]:
+    """Positions (n, 3) that wait where they are until they leap; from one place to the next nothing is seen to move."""
+    leaps = np.flatnonzero(np.linalg.norm(np.diff(values, axis=0), axis=1) > LEAP) + 1
+    return np.insert(times, leaps, times[leaps] - 1e-6), np.insert(values, leaps, values[leaps - 1], axis=0)
 
 
 def _changes(values: Array) -> NDArray[np.bool_]:
@@ -162,8 +173,8 @@ def _legend(scene: Scene, run: SceneRun) -> dict[str, Any]:
     error, lines = summary["pose_error"], []
     percent = error["percent_of_path"]
     share = "" if percent is None else f" ({percent:.2f} % of path)"
-    lines.append(("Position error", f"{1e3 * error['final_position']:.1f} mm{share}"))
-    lines.append(("Yaw error", f"{math.degrees(error['final_yaw']):.2f} deg"))
+    lines.append(("Position error at the end", f"{1e3 * error['final_position']:.1f} mm{share}"))
+    lines.append(("Yaw error at the end", f"{math.degrees(error['final_yaw']):z.2f} deg"))
     if "wheel_slip" in summary:
         lines.append(("Largest slip", f"{1e3 * summary['wheel_slip']['max']:.0f} mm/s"))
     if "legs" in summary:
@@ -184,7 +195,7 @@ def _marks(scene: Scene) -> dict[str, Any]:
     slip = any(frame.endswith("slip") for frame in frames)
     return {
         "forces": any("forces/" in path for path in scene.tracks),
-        "loads": any("feet" in frame for frame in frames),
+        "feet": any("support/" in path for path in scene.tracks),
         "slip": [
             (f"over {1e3 * speed:g} mm/s", palette.css(color))
             for speed, color in zip(palette.SLIP_SPEEDS, palette.SLIP_COLORS, strict=True)

@@ -16,7 +16,7 @@ from rollerbench.recording import Recording
 from rollerbench.visualization import marks
 from rollerbench.visualization.model import read_model
 from rollerbench.visualization.motion import Motion, motion_of
-from rollerbench.visualization.shapes import Item
+from rollerbench.visualization.shapes import Box, Item
 
 Array = NDArray[np.float64]
 
@@ -87,7 +87,8 @@ class Scene:
         cameras: The views.
         view: The one at the start.
         shown: Which marks are seen at the start: "forces", "slip".
-        pitch: Distance of the finest grid lines [m].
+        pitches: Distances of the grid's lines, the finer first [m].
+        slope_deg: Inclination of the first run's ground; x points uphill.
     """
 
     runs: tuple[SceneRun, ...]
@@ -97,7 +98,8 @@ class Scene:
     cameras: Mapping[View, Camera]
     view: View
     shown: frozenset[str]
-    pitch: float
+    pitches: tuple[float, ...]
+    slope_deg: float
 
     @property
     def shown_items(self) -> tuple[Item, ...]:
@@ -161,8 +163,8 @@ def scene_of(
             poses |= more
         if not any(_same_reference(run, other) for other in runs[:index]):
             own += marks.ghost(robot, f"{prefix}ghost")
-            own += _trail(run.recording.reference_q_xyt, "reference", palette.REFERENCE, robot, prefix)
-        own += _trail(run.recording.q_xyt, "simulated", color, robot, prefix)
+            own += _trail(run, run.recording.reference_q_xyt, "reference", palette.REFERENCE, robot, prefix)
+        own += _trail(run, run.recording.q_xyt, "simulated", color, robot, prefix)
         items += own
         tracks |= poses
         times |= dict.fromkeys(poses, motion.time)
@@ -181,7 +183,8 @@ def scene_of(
         cameras=cameras(low, high, size, robots[0]),
         view=view,
         shown=frozenset(name for name, on in (("forces", forces), ("slip", slip)) if on),
-        pitch=0.1 if any(item.name == "fine_grid" for item in floor) else 1.0,
+        pitches=tuple(marks.grid_pitches(*_reach(floor), size)),
+        slope_deg=runs[0].recording.metadata.get("ground", {}).get("slope_deg", 0.0),
     )
 
 
@@ -217,7 +220,8 @@ def _robot(
         root = f"{path}/{model.root}"
         items = [_painted(item, color) if item.frame == root and item.name == "box" else item for item in items]
     tracks = model.tracks(motion.X_WB, motion.angles, path)
-    items.append(marks.heading(robot, f"{path}/{model.root}", color or palette.SIMULATED))
+    arrow_color = palette.SIMULATED if color is None else palette.HEADING
+    items.append(marks.heading(robot, f"{path}/{model.root}", arrow_color))
     return items, {**tracks, f"{prefix}ghost": motion.X_WR}
 
 
@@ -231,27 +235,49 @@ def _extras(run: SeenRun, robot: Robot, motion: Motion, prefix: str) -> list[tup
     return found
 
 
-def _trail(q_xyt: Array, layer: str, color: Color, robot: Robot, prefix: str) -> list[Item]:
-    return marks.trail(q_xyt[:, :2], layer, color, marks.size_of(robot), f"{prefix.replace('/', '_')}{layer}")
+def _trail(run: SeenRun, q_xyt: Array, layer: str, color: Color, robot: Robot, prefix: str) -> list[Item]:
+    """A trail on the ground, and on its steps."""
+    heights = np.zeros(len(q_xyt))
+    for step in run.recording.metadata.get("ground", {}).get("steps", ()):
+        heights[(q_xyt[:, 0] >= step["start"]) & (q_xyt[:, 0] <= step["end"])] = step["height"]
+    return marks.trail(
+        np.column_stack([q_xyt[:, :2], heights]),
+        layer,
+        color,
+        marks.size_of(robot),
+        f"{prefix.replace('/', '_')}{layer}",
+    )
+
+
+def _reach(floor: Sequence[Item]) -> tuple[Array, Array]:
+    """Where the ground begins and ends (2,)."""
+    slab = floor[0]
+    assert isinstance(slab.shape, Box)
+    half = 0.5 * np.array(slab.shape.size[:2])
+    return slab.X_FG[:2, 3] - half, slab.X_FG[:2, 3] + half
 
 
 def _same_reference(run: SeenRun, other: SeenRun) -> bool:
     """Whether the equations predict the same of both, so that one ghost does."""
     mine, theirs = run.recording, other.recording
     return (
-        mine.metadata["robot"] == theirs.metadata["robot"]
+        mine.metadata["robot_description"] == theirs.metadata["robot_description"]
         and np.array_equal(mine.time, theirs.time)
         and np.allclose(mine.reference_q_xyt, theirs.reference_q_xyt, rtol=0, atol=1e-9)
     )
 
 
 def _surroundings(runs: Sequence[SeenRun]) -> list[Item]:
-    """Bumps and steps of the first run's ground."""
-    ground = runs[0].recording.metadata.get("ground", {})
+    """Bumps and steps of all runs' ground."""
+    grounds = [run.recording.metadata.get("ground", {}) for run in runs]
     items = []
-    if ground.get("bumps"):
-        items += marks.bumps(*(np.array(ground["bumps"][key]) for key in ("centers", "half_widths", "heights")))
-    return items + marks.steps(ground.get("steps", ()), STEP_WIDTH)
+    for index, ground in enumerate(grounds):
+        if ground in grounds[:index]:
+            continue
+        if ground.get("bumps"):
+            items += marks.bumps(*(np.array(ground["bumps"][key]) for key in ("centers", "half_widths", "heights")))
+        items += marks.steps(ground.get("steps", ()), STEP_WIDTH)
+    return items
 
 
 def _painted(item: Item, color: Color) -> Item:

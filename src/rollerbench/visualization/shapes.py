@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from rollerbench.palette import Color
 
@@ -86,10 +86,11 @@ def merged(meshes: list[Mesh]) -> Mesh | None:
     return Mesh(vertices=np.concatenate([mesh.vertices for mesh in meshes]), faces=np.concatenate(faces))
 
 
-def ribbon(points: Array, width: float, height: float) -> Mesh | None:
-    """A flat band along points (n, 2), at a height over the ground [m]; None if they stay where they are."""
+def ribbon(points: Array, width: float, heights: ArrayLike) -> Mesh | None:
+    """A flat band along points (n, 2) at heights (n,), or one, over the ground [m]; None if they stay in place."""
     apart = np.linalg.norm(np.diff(points, axis=0), axis=1) > 1e-3 * width
-    points = points[np.concatenate([[True], apart])]
+    kept = np.concatenate([[True], apart])
+    points, z = points[kept], np.broadcast_to(np.asarray(heights, dtype=np.float64), len(points))[kept]
     if len(points) < 2:
         return None
     ahead = np.gradient(points, axis=0)
@@ -98,7 +99,7 @@ def ribbon(points: Array, width: float, height: float) -> Mesh | None:
     flat = np.stack([points + left, points - left], axis=1).reshape(-1, 2)
     first = 2 * np.arange(len(points) - 1)[:, np.newaxis]
     faces = np.concatenate([first + np.array([0, 1, 2]), first + np.array([1, 3, 2])])
-    return Mesh(vertices=np.column_stack([flat, np.full(len(flat), height)]), faces=faces)
+    return Mesh(vertices=np.column_stack([flat, np.repeat(z, 2)]), faces=faces)
 
 
 def polygon(corners: Array) -> Mesh:
