@@ -127,7 +127,7 @@ def test_what_is_not_a_run_is_refused(youbot: Path, tmp_path: Path) -> None:
     for name, content, message in (
         ("summary.json", "{", "not valid JSON"),
         ("summary.json", "{}", "lacks robot, scenario"),
-        ("summary.json", "[1]", "lacks robot, scenario"),
+        ("summary.json", "[1]", "expected keys, found list"),
         ("scenario.yaml", "a: [", "not valid YAML"),
         ("scenario.yaml", "- 1", "expected a mapping"),
         ("robot.yaml", "name: no body", "body"),
