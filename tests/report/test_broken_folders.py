@@ -87,6 +87,13 @@ def removed(name: str) -> Break:
     return lambda folder: (folder / name).unlink()
 
 
+def holding(name: str, text: str) -> Break:
+    def change(folder: Path) -> None:
+        (folder / name).write_text(text)
+
+    return change
+
+
 def model_with(old: str, new: str) -> Break:
     def change(folder: Path) -> None:
         text = (folder / "model.sdf").read_text()
@@ -129,10 +136,7 @@ REPLAYED: list[tuple[Break, str]] = [
 
 REPORTED: list[tuple[Break, str]] = [
     (removed("robot.yaml"), r"cart: .*lacks robot\.yaml"),
-    (
-        lambda folder: folder.joinpath("scenario.yaml").write_text("name: a") and None,
-        r"scenario\.yaml: .*lacks summary",
-    ),
+    (holding("scenario.yaml", "name: short"), r"scenario\.yaml: .*lacks summary"),
 ]
 
 
@@ -155,10 +159,9 @@ def test_a_broken_folder_has_no_report(cart: Path, tmp_path: Path, change: Break
         StoredRun.read(broken(cart, tmp_path, change))
 
 
-@pytest.mark.parametrize("column", ["left_front.slip_x", "left_front.joint_2", "desired_z"])
+@pytest.mark.parametrize("column", ["{leg}.slip_x", "{leg}.joint_2", "desired_z"])
 def test_recordings_of_legs_have_all_columns_too(hexapod: Path, tmp_path: Path, column: str) -> None:
-    leg = rb.Recording.read(hexapod).metadata["legs"][0]
-    column = column.replace("left_front", leg)
+    column = column.format(leg=rb.Recording.read(hexapod).metadata["legs"][0])
     folder = tmp_path / "legs"
     shutil.copytree(hexapod, folder)
     lacking(column)(folder)
