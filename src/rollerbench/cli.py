@@ -228,7 +228,7 @@ def analyze(
 
 @app.command(epilog="Example: rollerbench replay runs/left runs/slippery --html both.html")
 def replay(
-    runs: Annotated[list[Path], typer.Argument(help="Run folders; several are overlaid.")],
+    runs: Annotated[list[Path], typer.Argument(help="Run folders, or files in them; several are overlaid.")],
     html: Annotated[
         Path | None, typer.Option("--html", help="Write one HTML file instead of showing it.", show_default=False)
     ] = None,
@@ -243,9 +243,12 @@ def replay(
     from rollerbench.visualization.replay import replay as replay_runs
     from rollerbench.visualization.serve import serve_page
 
+    if html is not None:
+        _check_page(html)
     shown = replay_runs([*runs], camera=_view(camera), forces=forces, slip=slip)
     if html is not None:
-        _print(f"Written: {shown.write(html)}")
+        _write(html, shown.page())
+        _print(f"Written: {html}")
         return
 
     def ready(address: str) -> None:
@@ -267,19 +270,17 @@ def report(
     ] = None,
 ) -> None:
     """Write the report of a run again, or of several side by side; nothing is simulated."""
-    from rollerbench.description.files import write_atomically
     from rollerbench.report.page import report_page
-    from rollerbench.report.stored_run import StoredRun, run_folder
+    from rollerbench.report.stored_run import StoredRun
+    from rollerbench.stored import run_folder
 
-    stored = [StoredRun.read(run) for run in runs]
-    target = output or (run_folder(runs[0]) / "report.html" if len(runs) == 1 else Path("comparison.html"))
-    if target.is_dir():
-        raise RollerbenchError(f"{target}: is a folder; accepted: a file to write, such as comparison.html")
-    text = report_page(stored)
-    try:
-        write_atomically(target, text)
-    except OSError as error:
-        raise RollerbenchError(f"{target}: cannot be written: {error}") from error
+    target = (
+        output
+        if output is not None
+        else (run_folder(runs[0]) / "report.html" if len(runs) == 1 else Path("comparison.html"))
+    )
+    _check_page(target)
+    _write(target, report_page([StoredRun.read(run) for run in runs]))
     _print(f"Written: {target}")
 
 
@@ -292,7 +293,6 @@ def build(
 ) -> None:
     """Write the SDF model of robots beside their robot.yaml."""
     from rollerbench.description import load_robot
-    from rollerbench.description.files import write_atomically
     from rollerbench.resources import robot_file, robot_names
     from rollerbench.sdf import robot_to_sdf
 
@@ -300,10 +300,7 @@ def build(
         file = robot_file(name)
         robot = load_robot(file)
         target = file.parent / f"{robot.name}.sdf"
-        try:
-            write_atomically(target, robot_to_sdf(robot))
-        except OSError as error:
-            raise RollerbenchError(f"{target}: cannot be written: {error}") from error
+        _write(target, robot_to_sdf(robot))
         _print(f"{target}")
 
 
@@ -317,7 +314,6 @@ def export(
 ) -> None:
     """Write a robot as a model for other simulators."""
     from rollerbench.description import Robot, load_robot
-    from rollerbench.description.files import write_atomically
     from rollerbench.sdf import robot_to_mjcf, robot_to_sdf
 
     writers: dict[str, Callable[[Robot], str]] = {"sdf": robot_to_sdf, "mjcf": robot_to_mjcf}
@@ -327,10 +323,7 @@ def export(
     if output is None:
         print(text, end="")
         return
-    try:
-        write_atomically(output, text)
-    except OSError as error:
-        raise RollerbenchError(f"{output}: cannot be written: {error}") from error
+    _write(output, text)
     _print(f"{output}")
 
 
@@ -353,6 +346,23 @@ def schema(
 
         model = Scenario
     print(json.dumps(model.model_json_schema(), indent=2))
+
+
+def _check_page(target: Path) -> None:
+    """Refuses to write a page over anything but a page, such as a run's recording.parquet."""
+    if target.suffix.lower() != ".html" or target.is_dir():
+        raise RollerbenchError(f"{str(target)!r}: accepted: a file to write that ends in .html, such as page.html")
+
+
+def _write(target: Path, text: str) -> None:
+    from rollerbench.description.files import write_atomically
+
+    if target.is_dir():
+        raise RollerbenchError(f"{target}: is a folder; accepted: a file to write")
+    try:
+        write_atomically(target, text)
+    except OSError as error:
+        raise RollerbenchError(f"{target}: cannot be written: {error}") from error
 
 
 def _view(camera: str) -> "View":

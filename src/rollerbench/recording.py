@@ -2,7 +2,7 @@
 
 import io
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -58,6 +58,8 @@ wheel really obeys. force is what the ground does to the wheel, along the same a
 them.
 """
 
+FORCES = ("force_x", "force_y", "force_z")
+"""Columns of wheels that are recorded on request only."""
 
 LEG_COLUMNS: dict[str, str] = {
     **dict.fromkeys(("foot_x", "foot_y", "foot_z"), "m"),
@@ -73,9 +75,14 @@ LEG_COLUMNS: dict[str, str] = {
 """Columns of each leg, named leg.column, and their units; joint_ and effort_ are followed by the joint's number.
 
 foot is the lowest point of the foot's wheel and slip its velocity over the ground, in W; stance is 1 for a foot that
-shall stand and 0 for one in the air, load what it bears. The body's desired height and inclination are in desired_z,
-desired_roll and desired_pitch.
+shall stand and 0 for one in the air, load what it bears.
 """
+
+DESIRED_COLUMNS: dict[str, str] = {"desired_z": "m", "desired_roll": "rad", "desired_pitch": "rad"}
+"""The desired height and inclination of a body on legs, and their units."""
+
+SHOWN = 5
+"""Messages name so many missing columns."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -141,17 +148,26 @@ class Recording:
         """Reads recording.parquet, given as the file or as the run folder.
 
         Raises:
-            ResourceError: it is not there, or not a recording.
+            ResourceError: it is not there, not a recording, or lacks columns.
         """
         file = Path(path) / "recording.parquet" if Path(path).is_dir() else Path(path)
         try:
             table = pq.read_table(file)
-        except (OSError, pa.ArrowInvalid) as error:
+            metadata = {key.decode(): json.loads(value) for key, value in (table.schema.metadata or {}).items()}
+        except (OSError, pa.ArrowException, ValueError) as error:
             raise ResourceError(f"{file}: cannot be read as a recording: {error}") from error
-        metadata = {key.decode(): json.loads(value) for key, value in (table.schema.metadata or {}).items()}
-        missing = [name for name in ROBOT_COLUMNS if name not in table.column_names]
-        if missing or "wheels" not in metadata:
-            raise ResourceError(f"{file}: not a recording of rollerbench: it lacks {', '.join(missing) or 'wheels'}")
+        if "wheels" not in metadata:
+            raise ResourceError(f"{file}: not a recording of rollerbench: it lacks wheels")
+        missing = _missing(table.column_names, metadata["wheels"], metadata.get("legs", ()))
+        if missing:
+            more = f" and {len(missing) - SHOWN} more" if len(missing) > SHOWN else ""
+            raise ResourceError(
+                f"{file}: not a recording of rollerbench: it lacks {', '.join(missing[:SHOWN])}{more}; "
+                "accepted: a recording of this version"
+            )
+        strange = [field.name for field in table.schema if not pa.types.is_floating(field.type)]
+        if strange:
+            raise ResourceError(f"{file}: not a recording of rollerbench: {strange[0]} does not hold numbers")
         return cls(
             columns={name: table[name].to_numpy() for name in table.column_names},
             wheel_names=tuple(metadata.pop("wheels")),
@@ -162,8 +178,20 @@ class Recording:
         return np.column_stack([self.columns[name] for name in names])
 
 
+def _missing(columns: Iterable[str], wheels: Iterable[str], legs: Sequence[str]) -> list[str]:
+    """Columns that a recording of wheels and legs lacks; forces may be missing of all wheels."""
+    present = set(columns)
+    forces = any(f"{wheel}.{name}" in present for wheel in wheels for name in FORCES)
+    of_wheels = [name for name in WHEEL_COLUMNS if forces or name not in FORCES]
+    of_legs = [name for name in LEG_COLUMNS if not name.endswith("_")]
+    needed = [*ROBOT_COLUMNS, *(DESIRED_COLUMNS if legs else ())]
+    needed += [f"{wheel}.{name}" for wheel in wheels for name in of_wheels]
+    needed += [f"{leg}.{name}" for leg in legs for name in of_legs]
+    return [name for name in needed if name not in present]
+
+
 def _unit(name: str) -> str:
     column = name.rpartition(".")[2]
-    known = {**ROBOT_COLUMNS, "desired_z": "m", "desired_roll": "rad", "desired_pitch": "rad"}
+    known = ROBOT_COLUMNS | DESIRED_COLUMNS
     of_parts = WHEEL_COLUMNS | LEG_COLUMNS
     return known.get(name) or of_parts.get(column) or of_parts.get(column.rstrip("0123456789"), "rad/s")

@@ -117,6 +117,21 @@ def test_wheels_and_legs_failures_and_second_engines_side_by_side(youbot: Path, 
     assert "the robot tipped over" in report_page([failed], figures=[{}])
 
 
+@pytest.mark.parametrize(
+    ("engines", "named"),
+    [(["drake"], "Drake 1"), (["mujoco"], "MuJoCo 2"), (["drake", "mujoco"], "Drake 1, MuJoCo 2")],
+)
+def test_the_footer_names_the_engines_that_simulated(youbot: Path, engines: list[str], named: str) -> None:
+    run = StoredRun.read(youbot)
+    outcome = {key: run.summary[key] for key in ("simulated_final_pose", "pose_error", "error_budget")}
+    second = {"engine": engines[-1], "failure": None, "apart": [0.0] * 3, **outcome} if len(engines) > 1 else None
+    versions = {"rollerbench": "0", "drake": "1", "mujoco": "2", "python": "3"}
+    summary = {**run.summary, "engine": engines[0], "cross_check": second, "versions": versions}
+    page = report_page([dataclasses.replace(run, summary=summary)], figures=[{}])
+    (footer,) = re.findall(r"<footer>(.*?)</footer>", page, flags=re.DOTALL)
+    assert " ".join(footer.split()) == f"rollerbench 0, {named}, Python 3, seed 0"
+
+
 def test_what_is_not_a_run_is_refused(youbot: Path, tmp_path: Path) -> None:
     with pytest.raises(rb.ResourceError, match="no such folder"):
         StoredRun.read(tmp_path / "none")
@@ -127,7 +142,7 @@ def test_what_is_not_a_run_is_refused(youbot: Path, tmp_path: Path) -> None:
     for name, content, message in (
         ("summary.json", "{", "not valid JSON"),
         ("summary.json", "{}", "lacks robot, scenario"),
-        ("summary.json", "[1]", "lacks robot, scenario"),
+        ("summary.json", "[1]", "expected keys, found list"),
         ("scenario.yaml", "a: [", "not valid YAML"),
         ("scenario.yaml", "- 1", "expected a mapping"),
         ("robot.yaml", "name: no body", "body"),

@@ -13,6 +13,7 @@ import robots
 import rollerbench as rb
 from rollerbench.resources import robot_names, scenario_files
 from rollerbench.sdf import robot_to_mjcf
+from rollerbench.simulation.log import versions
 
 YOUBOT = [name for name in scenario_files() if name.startswith("youbot_") and "closed" not in name]
 SHORT: dict[str, Any] = {
@@ -160,6 +161,16 @@ def test_a_run_folder_repeats_itself(tmp_path: Path) -> None:
 def test_what_mujoco_does_not_simulate_is_refused(errors: dict[str, Any]) -> None:
     with pytest.raises(rb.DescriptionError, match=r"simulated by Drake only; accepted: engine: drake"):
         rb.run({**SHORT, "errors": errors}, save=False)
+
+
+def test_forces_are_recorded_by_drake_only() -> None:
+    with pytest.raises(rb.DescriptionError, match=r"recording\.forces = True: .*accepted: engine: drake or both"):
+        rb.run({**SHORT, "recording": {"forces": True}}, save=False)
+
+
+@pytest.mark.parametrize(("engine", "named"), [("drake", False), ("mujoco", True), ("both", True)])
+def test_versions_name_mujoco_where_it_simulated(engine: str, named: bool) -> None:
+    assert versions(engine).get("mujoco") == (mujoco.__version__ if named else None)
 
 
 def test_without_mujoco_the_error_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:

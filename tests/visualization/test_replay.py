@@ -125,9 +125,9 @@ def test_what_is_no_run_is_refused(folders: list[Path], tmp_path: Path) -> None:
         (broken / name).write_bytes((folders[0] / name).read_bytes())
     (broken / "summary.json").write_text("{")
     for folder, message in (
-        (tmp_path / "none", "not a folder"),
+        (tmp_path / "none", "no such folder"),
         (tmp_path / "empty", "recording.parquet"),
-        (broken, "not the folder of a run"),
+        (broken, "not valid JSON"),
     ):
         with pytest.raises(rb.ResourceError, match=message):
             rb.replay(folder)

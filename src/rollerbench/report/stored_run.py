@@ -1,6 +1,5 @@
 """A run as its folder holds it."""
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,12 +11,10 @@ from ruamel.yaml.error import YAMLError
 from rollerbench.description import Robot, load_robot
 from rollerbench.errors import DescriptionError, ResourceError
 from rollerbench.recording import Recording
+from rollerbench.stored import read_recording, read_summary, read_text, whole_folder
 
 NEEDED = ("scenario.yaml", "robot.yaml", "recording.parquet", "summary.json")
 """Files without which a folder is not that of a run."""
-
-SUMMARY_KEYS = ("robot", "scenario", "engine", "status", "failure", "seed", "versions", "pose_error", "error_budget")
-"""Some of what every summary.json holds."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -49,21 +46,11 @@ class StoredRun:
         Raises:
             ResourceError: it is not there, not the folder of a run, or holds a broken file.
         """
-        path = run_folder(folder)
-        if not path.is_dir():
-            raise ResourceError(
-                f"{path}: no such folder; accepted: the folder of a run, such as `rollerbench run` writes"
-            )
-        missing = [name for name in NEEDED if not (path / name).is_file()]
-        if missing:
-            raise ResourceError(
-                f"{path}: not the folder of a run: it lacks {', '.join(missing)}; "
-                "accepted: a folder that `rollerbench run` wrote"
-            )
+        path = whole_folder(folder, NEEDED)
         return cls(
             name=path.resolve().name,
-            summary=_summary(path / "summary.json"),
-            recording=_recording(path / "recording.parquet"),
+            summary=read_summary(path / "summary.json"),
+            recording=read_recording(path / "recording.parquet"),
             scenario=_scenario(path / "scenario.yaml"),
             robot=_robot(path / "robot.yaml"),
             page=_bytes(path / "recording.html"),
@@ -71,37 +58,16 @@ class StoredRun:
         )
 
 
-def run_folder(path: str | Path) -> Path:
-    """A run folder, given as such or by a file in it."""
-    return Path(path).parent if Path(path).is_file() else Path(path)
-
-
-def _summary(file: Path) -> Mapping[str, Any]:
-    try:
-        summary = json.loads(_text(file))
-    except ValueError as error:
-        raise ResourceError(f"{file}: not valid JSON: {error}") from error
-    missing = [key for key in SUMMARY_KEYS if key not in summary] if isinstance(summary, dict) else list(SUMMARY_KEYS)
-    if missing:
-        raise ResourceError(f"{file}: not the summary of a run: it lacks {', '.join(missing)}")
-    return summary
-
-
 def _scenario(file: Path) -> Mapping[str, Any]:
     try:
-        scenario = YAML(typ="safe", pure=True).load(_text(file))
+        scenario = YAML(typ="safe", pure=True).load(read_text(file))
     except (YAMLError, ValueError, RecursionError) as error:
         raise ResourceError(f"{file}: not valid YAML: {' '.join(str(error).split())}") from error
     if not isinstance(scenario, dict):
         raise ResourceError(f"{file}: expected a mapping of keys to values, found {type(scenario).__name__}")
+    if "summary" not in scenario:
+        raise ResourceError(f"{file}: not the scenario of a run: it lacks summary")
     return scenario
-
-
-def _recording(file: Path) -> Recording:
-    recording = Recording.read(file)
-    if not len(recording.time):
-        raise ResourceError(f"{file}: holds no sample")
-    return recording
 
 
 def _robot(file: Path) -> Robot:
@@ -109,13 +75,6 @@ def _robot(file: Path) -> Robot:
         return load_robot(file)
     except DescriptionError as error:
         raise ResourceError(str(error)) from error
-
-
-def _text(file: Path) -> str:
-    try:
-        return file.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise ResourceError(f"{file}: cannot be read as text: {error}") from error
 
 
 def _bytes(file: Path) -> bytes | None:

@@ -74,8 +74,7 @@ def provenance(scenario: Scenario, engine: str) -> dict[str, Any]:
         "robot": scenario.robot.name,
         "scenario": scenario.name,
         "engine": engine,
-        **versions(),
-        **({"mujoco": version("mujoco")} if engine == "mujoco" else {}),
+        **versions(engine),
         "robot_description": scenario.robot.model_dump(mode="json", exclude_none=True),
         "injected": {name: robot.model_dump(mode="json", exclude_none=True) for name, robot in injected.items()},
         "rollers": scenario.wheel_control.rollers,
@@ -99,9 +98,11 @@ def ground_of(scenario: Scenario) -> dict[str, Any]:
     }
 
 
-def versions() -> dict[str, str]:
-    """Versions of what computed a result."""
-    return {"rollerbench": version("rollerbench"), "drake": version("drake"), "python": platform.python_version()}
+def versions(engine: str = "drake") -> dict[str, str]:
+    """Versions of what computed a result with an engine: drake, mujoco or both."""
+    second = {"mujoco": version("mujoco")} if engine in ("mujoco", "both") else {}
+    own = {"rollerbench": version("rollerbench"), "drake": version("drake"), "python": platform.python_version()}
+    return {**own, **second}
 
 
 def station_samples(station: Station, scenario: Scenario, context: Context) -> Samples:

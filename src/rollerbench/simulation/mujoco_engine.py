@@ -36,6 +36,11 @@ def check(scenario: Scenario) -> None:
             f"engine = {scenario.engine!r}: torques of wheels are commanded in Drake only; accepted: engine: drake, or "
             "another command, with servo: implicit"
         )
+    if scenario.engine == "mujoco" and scenario.recording.forces:
+        raise DescriptionError(
+            f"engine = {scenario.engine!r}: recording.forces = True: forces of the ground are recorded by Drake only; "
+            "accepted: engine: drake or both, or forces: false"
+        )
     if scenario.ground.roll_resistance:
         raise DescriptionError(
             f"engine = {scenario.engine!r}: ground.roll_resistance is simulated by Drake only; accepted: engine: "

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from lxml import etree
@@ -97,23 +98,30 @@ class DrawnModel:
         ]
 
 
-def read_model(text: str) -> DrawnModel:
+def read_model(text: str, file: str | Path = "model.sdf") -> DrawnModel:
     """Reads SDF text as `rollerbench.sdf.robot_to_sdf` writes it.
+
+    Args:
+        text: The text.
+        file: What messages call it.
 
     Raises:
         ResourceError: it is not such a text.
     """
     try:
         model = etree.fromstring(text.encode("utf-8")).find("model")
-        assert model is not None
+        if model is None:
+            raise ValueError("it holds no model")
         links = {str(link.get("name")): link for link in model.findall("link")}
         poses = _poses(links)
         joints = tuple(_joint(element, poses) for element in model.findall("joint"))
-    except (etree.XMLSyntaxError, AssertionError, AttributeError, KeyError, ValueError) as error:
-        raise ResourceError(f"model.sdf: not a model of rollerbench: {error}") from error
-    visuals = {name: tuple(_visual(visual) for visual in link.findall("visual")) for name, link in links.items()}
-    (root,) = set(links) - {joint.child for joint in joints}
-    return DrawnModel(root=root, joints=_in_order(root, joints), visuals=visuals)
+        visuals = {name: tuple(_visual(visual) for visual in link.findall("visual")) for name, link in links.items()}
+        root = _root(links, joints)
+        return DrawnModel(root=root, joints=_in_order(root, joints), visuals=visuals)
+    except KeyError as error:
+        raise ResourceError(f"{file}: not a model of rollerbench: it lacks {error}") from error
+    except (etree.XMLSyntaxError, AttributeError, IndexError, RecursionError, ValueError) as error:
+        raise ResourceError(f"{file}: not a model of rollerbench: {error}") from error
 
 
 def transform(rotation: Array, position: Array) -> Array:
@@ -123,12 +131,19 @@ def transform(rotation: Array, position: Array) -> Array:
     return poses
 
 
+def _root(links: Mapping[str, etree._Element], joints: tuple[Joint, ...]) -> str:
+    roots = sorted(set(links) - {joint.child for joint in joints})
+    if len(roots) != 1:
+        raise ValueError(f"links that no joint carries: {', '.join(roots) or 'none'}; accepted: one")
+    return roots[0]
+
+
 def _in_order(root: str, joints: tuple[Joint, ...]) -> tuple[Joint, ...]:
     known, ordered, left = {root}, [], list(joints)
     while left:
         ready = [joint for joint in left if joint.parent in known]
         if not ready:
-            raise ResourceError(f"model.sdf: joint {left[0].name}: its links are not connected with {root}")
+            raise ValueError(f"joint {left[0].name}: its links are not connected with {root}")
         ordered += ready
         known |= {joint.child for joint in ready}
         left = [joint for joint in left if joint.child not in known]
@@ -140,6 +155,8 @@ def _poses(links: Mapping[str, etree._Element]) -> dict[str, Array]:
     found: dict[str, Array] = {}
 
     def pose(name: str) -> Array:
+        if name not in links:
+            raise ValueError(f"a pose is relative to the unknown link {name!r}")
         if name not in found:
             element = links[name].find("pose")
             base = None if element is None else element.get("relative_to")
@@ -153,6 +170,9 @@ def _poses(links: Mapping[str, etree._Element]) -> dict[str, Array]:
 
 def _joint(element: etree._Element, poses: Mapping[str, Array]) -> Joint:
     parent, child = (str(element.findtext(tag)) for tag in ("parent", "child"))
+    for link in (parent, child):
+        if link not in poses:
+            raise ValueError(f"joint {element.get('name')}: unknown link {link!r}")
     axis = element.findtext("axis/xyz")
     return Joint(
         name=str(element.get("name")),
@@ -165,7 +185,8 @@ def _joint(element: etree._Element, poses: Mapping[str, Array]) -> Joint:
 
 def _visual(element: etree._Element) -> Item:
     geometry, color = element.find("geometry"), element.findtext("material/diffuse")
-    assert geometry is not None
+    if geometry is None or not len(geometry):
+        raise ValueError(f"visual {element.get('name')}: it has no shape")
     return Item(
         frame="",
         name=str(element.get("name")),

@@ -1,7 +1,6 @@
 """Stored runs in the viewer of the Python package meshcat, from their folders alone and without Drake."""
 
 import html
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,9 +8,13 @@ from typing import Any
 
 from rollerbench.description.files import write_atomically
 from rollerbench.errors import ResourceError
-from rollerbench.recording import Recording
+from rollerbench.stored import read_recording, read_summary, read_text, run_folder, whole_folder
+from rollerbench.visualization.model import read_model
 from rollerbench.visualization.page import commands, scene_page
 from rollerbench.visualization.scenes import Scene, SeenRun, View, scene_of
+
+NEEDED = ("summary.json", "model.sdf", "recording.parquet")
+"""Files without which a run cannot be shown."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,16 +75,16 @@ def replay(
     """Shows stored runs without simulating them again, several of them overlaid.
 
     Args:
-        runs: Run folders.
+        runs: Run folders, or files in them.
         camera: The view at the start; "follow" goes with the first run's robot.
         forces: Whether to show the contacts' forces at the start, of runs that recorded them.
         slip: Whether to show where wheels slid at the start.
         frames_per_second: How often robots move [1/s]; each frame is a sample of the recording.
 
     Raises:
-        ResourceError: a folder is not a run's.
+        ResourceError: a folder is not a run's, or not whole.
     """
-    folders = [Path(runs)] if isinstance(runs, str | Path) else [Path(run) for run in runs]
+    folders = [run_folder(run) for run in ([runs] if isinstance(runs, str | Path) else runs)]
     if not folders:
         raise ResourceError("replay: no run folder; accepted: one or more")
     if not frames_per_second > 0:
@@ -101,22 +104,18 @@ def replay(
     return Replay(scene=scene_of(named, view=camera, forces=forces, slip=slip, frames_per_second=frames_per_second))
 
 
-def read_run(folder: Path) -> SeenRun:
-    """What a run folder tells of what was seen.
+def read_run(path: str | Path) -> SeenRun:
+    """What a run folder, given as such or by a file in it, tells of what was seen.
 
     Raises:
-        ResourceError: it is not a run's folder.
+        ResourceError: it is not a run's folder, or not whole.
     """
-    if not folder.is_dir():
-        raise ResourceError(f"{folder}: not a folder; accepted: a run folder, as rollerbench run writes it")
-    recording = Recording.read(folder / "recording.parquet")
-    try:
-        model = (folder / "model.sdf").read_text(encoding="utf-8")
-        summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise ResourceError(f"{folder}: not the folder of a run: {error}") from error
-    if not isinstance(summary, dict) or "pose_error" not in summary:
-        raise ResourceError(f"{folder / 'summary.json'}: not the summary of a run")
-    if "robot_description" not in recording.metadata:
-        raise ResourceError(f"{folder / 'recording.parquet'}: does not tell of which robot it is")
-    return SeenRun(name=summary["scenario"], recording=recording, model=model, summary=summary)
+    folder = whole_folder(path, NEEDED)
+    summary, model = read_summary(folder / "summary.json"), read_text(folder / "model.sdf")
+    read_model(model, folder / "model.sdf")
+    return SeenRun(
+        name=summary["scenario"],
+        recording=read_recording(folder / "recording.parquet"),
+        model=model,
+        summary=summary,
+    )
