@@ -38,7 +38,7 @@ def summarize(
         "failure": simulated.failure,
         "seed": scenario.seed,
         "changed_settings": changed_settings(scenario),
-        "versions": versions(),
+        "versions": versions(scenario.engine),
         "duration": duration,
         "wall_time": simulated.wall_time,
         "realtime_factor": duration / simulated.wall_time if simulated.wall_time else 0.0,
