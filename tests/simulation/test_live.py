@@ -108,6 +108,21 @@ def test_a_meshcat_alone_shows_the_run_unpaced(scenario: rb.Scenario, unseen: rb
     assert meshcat.GetButtonNames() == []
 
 
+def test_pictures_between_the_steps_do_not_change_how_rollers_are_followed(meshcat: Meshcat) -> None:
+    scenario = rb.load_scenario(
+        {
+            "name": "watched",
+            "robot": "kiwi",
+            "duration": 1.5,
+            "command": {"type": "twist", "v_xyw_B": [0.3, 0.0, 0.5], "ramp": 0.3},
+            "plant": {"time_step": 0.005},
+            "recording": {"html": False, "frames_per_second": 30},
+        }
+    )
+    unseen = rb.run(scenario, save=False)
+    assert_same(rb.run(scenario, save=False, meshcat=meshcat).recording, unseen.recording)
+
+
 def test_pause_step_and_speed(scenario: rb.Scenario, unseen: rb.RunResult, meshcat: Meshcat) -> None:
     reached, paused = [0.0], []
 

@@ -198,7 +198,8 @@ class Teleop:
             "fault": session.fault,
             "driver": order.driver,
             "late": order.late,
-            **session.state(order.message),
+            "lapses": order.lapses,
+            **session.state(None if session.fault else order.message),
         }
         server.broadcast(self._state)
 
