@@ -19,7 +19,6 @@ from rollerbench.simulation.teleop.session import PERIOD, Session, teleop_scenar
 from rollerbench.simulation.teleop.wheel_session import WheelSession
 from rollerbench.visualization.live_scene import LiveScene
 from rollerbench.visualization.scene import local_meshcat
-from rollerbench.visualization.serve import EVERYWHERE
 
 FRAME_TIME, STATE_TIME = 1 / 30, 1 / 15
 """Times between two pictures, and between two states that pages are told [s]."""
@@ -94,6 +93,9 @@ class Teleop:
 
     def __enter__(self) -> Self:
         """Runs in a thread until the block ends; returns once the page is served."""
+        self._stop.clear()
+        self._ready.clear()
+        self._error = None
         self._thread = threading.Thread(target=self._run_quietly, name="teleop", daemon=True)
         self._thread.start()
         self._ready.wait()
@@ -134,7 +136,7 @@ class Teleop:
         server = Server(desk, self._host, self._port)
         try:
             # Meshcat wants to be spoken to from the thread that made it.
-            meshcat = local_meshcat("*" if self._host in EVERYWHERE else self._host)
+            meshcat = local_meshcat(self._host)
             legs = bool(self._scenario.robot.legs)
             session: Session = (LegSession if legs else WheelSession)(self._scenario, meshcat)
             scene = LiveScene(meshcat, session.robot, camera="follow")
