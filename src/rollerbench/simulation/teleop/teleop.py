@@ -51,6 +51,8 @@ class Moment:
 class Teleop:
     """A robot in simulation, and a page to drive it by hand: `run` here, or a `with` block while which it runs.
 
+    The port of its scene, which is Drake's Meshcat, stays open until the process ends.
+
     Attributes:
         url: The page's address, once it runs.
         history: The last moments.
@@ -79,9 +81,10 @@ class Teleop:
         Raises:
             RollerbenchError: an argument is not valid.
         """
-        if isinstance(timeout, bool) or not (math.isfinite(timeout) and timeout > 0):
+        number = isinstance(timeout, int | float) and not isinstance(timeout, bool)
+        if not (number and math.isfinite(timeout) and timeout > 0):
             raise RollerbenchError(f"--timeout {timeout}: accepted: a positive number of seconds")
-        if not 0 <= port <= LARGEST_PORT:
+        if type(port) is not int or not 0 <= port <= LARGEST_PORT:
             raise RollerbenchError(f"--port {port}: accepted: 0 (any that is free) to {LARGEST_PORT}")
         self._scenario = teleop_scenario(robot, overrides)
         self._host, self._port, self._timeout = host, port, timeout
