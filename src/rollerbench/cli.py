@@ -78,7 +78,9 @@ def run(
         bool, typer.Option("--check-step", help="Simulate a second time with half the step, and compare.")
     ] = False,
     live: Annotated[bool, typer.Option("--live", help="Show the run in a browser, in real time.")] = False,
-    host: Annotated[str, typer.Option(help="With --live: address to listen at; * lets other machines in.")] = LOCAL,
+    host: Annotated[
+        str, typer.Option(help="With --live: address to listen at; 0.0.0.0 lets other machines in.")
+    ] = LOCAL,
     port: Annotated[
         int | None, typer.Option(help="With --live: port to listen at; 0 for any.", show_default="first free from 7000")
     ] = None,
@@ -235,7 +237,7 @@ def replay(
     camera: Annotated[str, typer.Option(help="iso, top, or follow: with the first robot.")] = "iso",
     forces: Annotated[bool, typer.Option("--forces", help="Show forces of the ground, if recorded.")] = False,
     slip: Annotated[bool, typer.Option("--slip", help="Show where wheels slid.")] = False,
-    host: Annotated[str, typer.Option(help="Address to listen at; * lets other machines look.")] = "localhost",
+    host: Annotated[str, typer.Option(help="Address to listen at; 0.0.0.0 lets other machines look.")] = "localhost",
     port: Annotated[int, typer.Option(help="Port to listen at.", show_default="any free one", min=0, max=65535)] = 0,
     open_: Annotated[bool, typer.Option("--open/--no-open", help="Open a browser.")] = True,
 ) -> None:

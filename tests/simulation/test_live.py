@@ -17,6 +17,7 @@ from rollerbench.errors import ResourceError, SimulationError
 from rollerbench.recording import Recording
 from rollerbench.simulation.live import FRAME, LATEST, Pace
 from rollerbench.simulation.watch import CHUNK
+from rollerbench.visualization.live_scene import LiveScene
 from rollerbench.visualization.scene import local_meshcat
 
 QUICK = {"duration": 0.4, "command.ramp": 0.1, "recording.html": False}
@@ -106,6 +107,24 @@ def test_a_meshcat_alone_shows_the_run_unpaced(scenario: rb.Scenario, unseen: rb
     for path in ("/ghost/body", "/trails/simulated/0", "/trails/reference/0", "/forces/front_left_0/arrow"):
         assert meshcat.HasPath(path)
     assert meshcat.GetButtonNames() == []
+    LiveScene(meshcat, rb.load_robot("kiwi"))
+    for path in ("/trails/simulated/0", "/forces", "/ghost/front_left"):
+        assert not meshcat.HasPath(path)
+
+
+def test_pictures_between_the_steps_do_not_change_how_rollers_are_followed(meshcat: Meshcat) -> None:
+    scenario = rb.load_scenario(
+        {
+            "name": "watched",
+            "robot": "kiwi",
+            "duration": 1.5,
+            "command": {"type": "twist", "v_xyw_B": [0.3, 0.0, 0.5], "ramp": 0.3},
+            "plant": {"time_step": 0.005},
+            "recording": {"html": False, "frames_per_second": 30},
+        }
+    )
+    unseen = rb.run(scenario, save=False)
+    assert_same(rb.run(scenario, save=False, meshcat=meshcat).recording, unseen.recording)
 
 
 def test_pause_step_and_speed(scenario: rb.Scenario, unseen: rb.RunResult, meshcat: Meshcat) -> None:

@@ -51,8 +51,8 @@ class RollerWindow(LeafSystem):
     speed of the joint change. The wheel's angle counts on. Out of the window rollers spin freely, so that they keep
     their angular velocity along their axis u, w_R . u, but for the damping of their joints; the hub gets that momentum.
 
-    This happens after each step, in the monitor of a simulator: `follow_rollers(simulator)`. A simulation without it
-    stops with an error. Restored states are followed from the simulator's Initialize on.
+    This happens after each of the plant's steps, in the monitor of a simulator: `follow_rollers(simulator)`. A
+    simulation without it stops with an error. Restored states are followed from the simulator's Initialize on.
 
     Output ports:
         rollers (1 + sum of 1 + 2 count over the windowed wheels): the system's state. The time up to which the wheels
@@ -91,21 +91,23 @@ class RollerWindow(LeafSystem):
 
     def follower(self) -> Callable[[Context], None]:
         """A function that follows the wheels in a root context, to call after each step."""
-        plant = self._plant
+        plant, step = self._plant, self._plant.time_step()
         wheels = [_Follower(wheel, offset) for wheel, offset in zip(self._wheels, self.offsets.values(), strict=True)]
         starts, steps = -1, 0
 
         def follow(root: Context) -> None:
             # Called after every step: what happens seldom is behind the return.
             nonlocal starts, steps
+            started, now = starts != self._starts, root.get_time()
+            if not started and now != round(now / step) * step:
+                return  # A step that another System's event made: the plant has nothing new.
             context = plant.GetMyMutableContextFromRoot(root)
             angle = plant.GetPositions(context).item
-            started = starts != self._starts
             behind = [w for w in wheels if abs(angle(w.position) * w.per_pitch + w.middle) > FARTHEST]
             steps += 1
             if not (behind or started or steps >= CHECK_STEPS // 2):
                 return
-            now, velocities = root.get_time(), plant.GetVelocities(context)
+            velocities = plant.GetVelocities(context)
             state = self.GetMyMutableContextFromRoot(root).get_mutable_discrete_state_vector()
             for wheel in wheels if started else behind:
                 wheel.restore(context, state, everything=started)

@@ -51,7 +51,8 @@ class Advanced:
 
     Attributes:
         failure: Why it did not reach the end, or None.
-        wall_time: Time that it took, without that of showing it and of waiting for the clock or a user [s].
+        wall_time: Time that it took, without that of showing it, of telling its progress, and of waiting for
+            the clock or a user [s].
     """
 
     failure: str | None
@@ -86,11 +87,11 @@ def advance(
             started = time.perf_counter()
             simulator.AdvanceTo(done * step)
             what = check()
+            wall_time += time.perf_counter() - started
             if what is not None:
                 failure = f"at t = {done * step:.3f} s {what}"
             elif progress is not None:
                 progress(done * step)
-            wall_time += time.perf_counter() - started
             over = done == steps or failure is not None
             if show is not None and show.frame(over=over):
                 done, wall_time, failure = 0, 0.0, None

@@ -22,6 +22,12 @@ ASPECT = 1.3
 STATION_GROUND = "/drake/visualizer/ground"
 """Ground that a station draws in its Meshcat, without a grid."""
 
+LEFTOVERS = ("/ghost", "/heading", "/trails", "/forces", "/support")
+"""What an earlier run may have left in a Meshcat."""
+
+TRAIL_PIECES = 200
+"""Pieces of a trail that are kept, so that days of driving stay small."""
+
 TRAIL_PIECE = 60
 """Points of a piece of a trail: only the last piece is drawn anew when the robot moves on."""
 
@@ -45,6 +51,8 @@ class LiveScene:
             reference_q_xyt: Path (n, 3) that it will be asked to drive, if known; the ground reaches beyond it.
         """
         self._meshcat, self._robot, self._size = meshcat, robot, marks.size_of(robot)
+        for path in LEFTOVERS:
+            meshcat.Delete(path)
         path = np.zeros((1, 3)) if reference_q_xyt is None else reference_q_xyt
         self._low, self._high = path[:, :2].min(axis=0), path[:, :2].max(axis=0)
         if reference_q_xyt is None:
@@ -126,6 +134,8 @@ class _Trail:
             self._meshcat.SetTriangleMesh(path, band.vertices.T, band.faces.T.astype(np.int32), self._color)
         if len(self._points) >= TRAIL_PIECE:
             self._points, self._piece = self._points[-2:], self._piece + 1
+            if self._piece >= TRAIL_PIECES:
+                self._meshcat.Delete(f"/trails/{self._layer}/{self._piece - TRAIL_PIECES}")
 
     def restart(self) -> None:
         self._meshcat.Delete(f"/trails/{self._layer}")

@@ -20,6 +20,7 @@ from pydrake.systems.framework import DiagramBuilder
 from rollerbench.description import Robot
 from rollerbench.errors import ResourceError
 from rollerbench.kinematics.bumps import Bumps
+from rollerbench.visualization.serve import EVERYWHERE
 
 GROUND_SIZE = 40
 """Side of the ground that is shown, over the size of the robot [-]."""
@@ -32,7 +33,7 @@ def local_meshcat(host: str = "localhost", port: int | None = None) -> Meshcat:
     """A Meshcat server that only this machine can reach, unless it is told otherwise.
 
     Args:
-        host: Name or address of this machine to listen at; "*" for all that it has, so that others can look too.
+        host: Name or address of this machine to listen at; "0.0.0.0" for all that it has, so that others can look too.
         port: Port to listen at, 0 or from 1024 to 65535; 0 for any free one, None for the first that is from 7000 on.
 
     Raises:
@@ -44,7 +45,7 @@ def local_meshcat(host: str = "localhost", port: int | None = None) -> Meshcat:
     level = logger.level
     logger.setLevel(logging.WARNING)  # Drake would announce the address, as the callers do.
     try:
-        return Meshcat(MeshcatParams(host=host, port=port, show_stats_plot=False))
+        return Meshcat(MeshcatParams(host="*" if host in EVERYWHERE else host, port=port, show_stats_plot=False))
     except (RuntimeError, SystemExit) as error:
         where = host if port is None else f"{host}, port {port}"
         raise ResourceError(

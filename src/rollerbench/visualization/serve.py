@@ -2,6 +2,7 @@
 
 import asyncio
 import errno
+import re
 import socket
 from collections.abc import Callable
 
@@ -12,6 +13,15 @@ from rollerbench.errors import ResourceError
 
 EVERYWHERE = ("", "*", "0.0.0.0", "::")
 """Hosts that mean every address of this machine."""
+
+
+def names(host: str) -> str:
+    """Pattern of the names under which a server at a host answers.
+
+    A foreign page that had its own name lead here gets nothing. Only a server for everyone, whose names it cannot know,
+    answers to all.
+    """
+    return ".*" if host in EVERYWHERE else rf"^(localhost|127\.0\.0\.1|\[::1\]|\[?{re.escape(host)}\]?)$"
 
 
 def listen(host: str, port: int) -> tuple[list[socket.socket], str]:
@@ -26,7 +36,7 @@ def listen(host: str, port: int) -> tuple[list[socket.socket], str]:
     """
     try:
         sockets = _listening(None if host in EVERYWHERE else host, port)
-    except (OSError, OverflowError) as error:
+    except (OSError, OverflowError, UnicodeError) as error:
         raise ResourceError(
             f"--host {host} --port {port}: {error}; accepted: a host of this machine, and a port that is free (0: any)"
         ) from error
@@ -79,10 +89,16 @@ def serve_page(
     """
 
     async def serve() -> None:
-        HTTPServer(Application([("/", _Page, {"page": page})])).add_sockets(sockets)
+        application = Application()
+        application.add_handlers(names(host), [("/", _Page, {"page": page})])
+        HTTPServer(application).add_sockets(sockets)
         if ready is not None:
             ready(address)
         await asyncio.Event().wait()
 
     sockets, address = listen(host, port)
-    asyncio.run(serve())
+    try:
+        asyncio.run(serve())
+    finally:
+        for each in sockets:
+            each.close()

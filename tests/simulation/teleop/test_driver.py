@@ -166,13 +166,23 @@ def test_who_touched_last_drives_until_silence_or_goodbye() -> None:
     assert (desk.order(0.2).driver, desk.order(0.2).message) == (2, second)
     assert desk.order(0.6).message == second
     late = desk.order(0.6 + 1e-6)
-    assert (late.message, late.late) == (None, True)
+    assert (late.message, late.driver, late.late, late.lapses) == (None, None, True, 1)
+    # What went on by itself, or was held back on the way, does not drive again.
+    for held_back in (second, second.model_copy(update={"touch": 2})):
+        desk.receive(2, held_back, 0.7)
+        assert desk.order(0.7).driver is None
+    second = second.model_copy(update={"touch": 3, "lapses": 1})
     desk.receive(2, second, 0.7)
-    assert desk.order(0.7).message == second
+    assert (desk.order(0.7).message, desk.order(0.7).late) == (second, False)
+    # Also if nobody asked for orders meanwhile.
+    desk.receive(2, second, 1.3)
+    assert desk.order(1.3).message is None
+    second = second.model_copy(update={"touch": 4, "lapses": 2})
+    desk.receive(2, second, 1.4)
     desk.leave(1)
-    assert desk.order(0.7).driver == 2
+    assert desk.order(1.4).driver == 2
     desk.leave(2)
-    assert (desk.order(0.7).driver, desk.order(0.7).message) == (None, None)
+    assert (desk.order(1.4).driver, desk.order(1.4).message) == (None, None)
     desk.receive(3, Message(touch=0, action="reset"), 0.8)
     assert [desk.order(0.8).actions, desk.order(0.8).actions] == [("reset",), ()]
 

@@ -63,6 +63,22 @@ def test_a_page_drives_the_robot_and_the_robot_stops_when_it_goes() -> None:
         until(lambda: not any(state()["twist"]))
         page.keyboard.up("q")
 
+        # Space stops also after a click into the scene, and what is still held then does not drive on.
+        vx.focus()
+        page.keyboard.press("ArrowRight")
+        until(lambda: state()["twist"][0] > 0)
+        page.locator("#scene").click()
+        page.keyboard.press("Space")
+        until(lambda: not any(state()["twist"]))
+        page.keyboard.down("w")
+        until(lambda: state()["twist"][0] > 0)
+        page.keyboard.press("Space")
+        until(lambda: not any(state()["twist"]))
+        page.keyboard.down("w")
+        page.wait_for_timeout(300)
+        assert not any(state()["twist"])
+        page.keyboard.up("w")
+
         # One wheel alone, which contradicts the others.
         page.get_by_label("front left, speed").focus()
         for _ in range(5):

@@ -13,6 +13,7 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from typing import Any
 
+import numpy as np
 import pytest
 from tornado.httpclient import HTTPClientError, HTTPRequest
 from tornado.websocket import WebSocketClientConnection, websocket_connect
@@ -20,7 +21,11 @@ from tornado.websocket import WebSocketClientConnection, websocket_connect
 import rollerbench as rb
 from rollerbench.cli import main
 from rollerbench.simulation.teleop import Teleop
+from rollerbench.simulation.teleop.desk import Message
+from rollerbench.simulation.teleop.leg_session import LegSession
 from rollerbench.simulation.teleop.server import FILES
+from rollerbench.simulation.teleop.session import teleop_scenario
+from rollerbench.simulation.teleop.wheel_session import WheelSession
 
 PATIENCE = 60.0
 """Machines may be slow: nothing here is waited for without an end [s]."""
@@ -69,10 +74,16 @@ def test_silence_and_goodbye_stop_the_robot() -> None:
                 # Silence, the connection open.
                 await until(lambda: teleop.state()["late"])
                 await until(lambda: teleop.history[-1].largest_speed == 0.0)
-                assert teleop.state()["driver"] == hello["you"]
-                # It speaks again, and single wheels.
+                assert teleop.state()["driver"] is None
+                # It goes on by itself, and its user does something before it was told: nothing moves.
+                stopped = teleop.state()["time"]
+                await until(lambda: teleop.state()["time"] > stopped + 0.4, channel, **ahead)
+                await until(lambda: teleop.state()["time"] > stopped + 0.8, channel, **{**ahead, "touch": 2})
+                assert teleop.history[-1].largest_speed == 0.0
+                # Its user does something anew, and single wheels.
+                ahead |= {"touch": 3, "lapses": 1}
                 await until(lambda: teleop.history[-1].largest_speed > 1.0, channel, **ahead)
-                wheel = {"touch": 2, "mode": "wheels", "wheels": {"front": 5.0}}
+                wheel = {"touch": 4, "lapses": 1, "mode": "wheels", "wheels": {"front": 5.0}}
                 await until(lambda: teleop.state()["wheels"]["front"]["told"] == 5.0, channel, **wheel)
                 told = [wheel["told"] for wheel in teleop.state()["wheels"].values()]
                 assert told == pytest.approx([5.0, 0.0, 0.0])
@@ -161,6 +172,24 @@ def test_a_hexapod_walks_and_changes_its_posture() -> None:
                 assert teleop.state()["asked"]["posture"] == "mammal"
 
         asyncio.run(drive())
+
+
+@pytest.mark.parametrize(
+    ("robot", "command"),
+    [
+        ("youbot_base", {}),
+        ("youbot_base", {"mode": "wheels", "wheels": {"front_left": 1e308}}),
+        ("wheel_leg_hexapod", {"body": (1e308, -1e308, 1e308), "posture": "none", "gait": "none"}),
+    ],
+)
+def test_no_command_is_too_large(robot: str, command: dict[str, Any]) -> None:
+    scenario = teleop_scenario(robot)
+    session = (LegSession if scenario.robot.legs else WheelSession)(scenario)
+    message = Message(touch=1, twist=(1e308, 1e308, 1e308), **command)
+    session.advance(message)
+    assert session.fault == ""
+    largest = [axis["largest"] for axis in session.hello()["axes"]]
+    assert (np.abs(session.state(message)["twist"]) <= np.multiply(largest, 10)).all()
 
 
 @pytest.mark.parametrize(

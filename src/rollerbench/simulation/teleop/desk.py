@@ -14,6 +14,7 @@ class Message(BaseModel):
 
     Attributes:
         touch: Counts what its user did; a page whose count grows takes over.
+        lapses: How often pages that drove had fallen silent, as far as the page was told.
         mode: Whether the "twist" or the "wheels" count.
         twist: vx, vy, wz [m/s, m/s, rad/s].
         wheels: Speeds of driven wheels by name [rad/s]; 0 for those left out.
@@ -26,9 +27,10 @@ class Message(BaseModel):
         action: What to do once.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
     touch: int
+    lapses: int = 0
     mode: Literal["twist", "wheels"] = "twist"
     twist: tuple[FiniteFloat, FiniteFloat, FiniteFloat] = (0.0, 0.0, 0.0)
     wheels: dict[str, FiniteFloat] = Field(default_factory=dict)
@@ -51,10 +53,11 @@ class Order:
     """What counts in a period of control.
 
     Attributes:
-        message: The last command of the page that drives; None if there is none, or it is too old.
+        message: The last command of the page that drives; None if there is none.
         driver: Number of that page, None if nobody drives.
-        age: How old the command is [s], infinite if there never was one.
-        late: Whether it is too old.
+        age: How old the last command is [s], infinite if there never was one.
+        late: Whether the last page that drove fell silent, and nobody drives since.
+        lapses: How often that happened.
         actions: What to do once.
     """
 
@@ -62,12 +65,17 @@ class Order:
     driver: int | None
     age: float
     late: bool
+    lapses: int
     actions: tuple[Action, ...]
 
 
 @dataclass
 class Desk:
     """Takes messages in one thread, and gives orders in another.
+
+    A page whose command became too old no longer drives. Its user must do something anew, after the page was told:
+    neither a page that goes on by itself nor commands that were held back on the way move the robot again. A robot on
+    legs ends a change of posture that is under way before it rests.
 
     Attributes:
         timeout: Age from which on a command no longer counts [s].
@@ -80,15 +88,19 @@ class Desk:
     _last: Message | None = None
     _heard: float = float("-inf")
     _actions: list[Action] = field(default_factory=list)
+    _late: bool = False
+    _lapses: int = 0
 
     def receive(self, client: int, message: Message, now: float) -> None:
         """Takes a message of a page that arrived at a time [s]; only that of the page that drives commands."""
         with self._lock:
+            self._check(now)
             if message.action is not None:
                 self._actions.append(message.action)
             if message.touch > self._touches.get(client, 0):
                 self._touches[client] = message.touch
-                self._driver = client
+                if message.lapses == self._lapses:
+                    self._driver, self._late = client, False
             if client == self._driver:
                 self._last, self._heard = message, now
 
@@ -103,6 +115,17 @@ class Desk:
         """What counts at a time [s]."""
         with self._lock:
             actions, self._actions = tuple(self._actions), []
-            age = now - self._heard
-            late = self._driver is not None and age > self.timeout
-            return Order(message=None if late else self._last, driver=self._driver, age=age, late=late, actions=actions)
+            self._check(now)
+            return Order(
+                message=self._last,
+                driver=self._driver,
+                age=now - self._heard,
+                late=self._late,
+                lapses=self._lapses,
+                actions=actions,
+            )
+
+    def _check(self, now: float) -> None:
+        if self._driver is not None and now - self._heard > self.timeout:
+            self._driver = self._last = None
+            self._late, self._lapses = True, self._lapses + 1

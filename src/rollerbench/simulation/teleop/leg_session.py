@@ -77,7 +77,7 @@ class LegSession(Session):
         last = self._last
         return {
             "mode": "twist",
-            "twist": list(message.twist if message is not None else (0.0, 0.0, 0.0)),
+            "twist": list(self._used(message).twist),
             "told_twist": plain(self._eval("reference_twist")),
             "measured_twist": plain(self._eval("twist")),
             "pose": plain(pose),
@@ -108,22 +108,30 @@ class LegSession(Session):
 
     def _command(self, message: Message | None) -> None:
         """Sets the inputs; without a command the twist is zero, and the rest as it was."""
-        message, twist = (self._last, (0.0, 0.0, 0.0)) if message is None else (message, message.twist)
-        self._last = message
-        names = [posture.name for posture in self.robot.standing]
-        mode = LegMode(
-            posture=message.posture if message.posture in names else names[0],
-            motion=message.motion,
-            gait=message.gait if message.gait in GAITS else next(iter(GAITS)),
-            change=message.change,
-        )
-        most = np.array([axis.largest for axis in self._axes])
-        height, roll, pitch = np.clip(message.body, *(sign * np.array(self._body) for sign in (-1, 1))).tolist()
+        self._last = last = self._used(message)
+        assert last.posture is not None
+        mode = LegMode(posture=last.posture, motion=last.motion, gait=last.gait, change=last.change)
+        height, roll, pitch = last.body
         offset = [0.0, 0.0, 1e-3 * height, math.radians(roll), math.radians(pitch), 0.0]
         station = self._station
-        station.GetInputPort("twist_command").FixValue(self._context, np.clip(twist, -most, most))
+        station.GetInputPort("twist_command").FixValue(self._context, np.array(last.twist))
         station.GetInputPort("body_offset").FixValue(self._context, np.array(offset))
         station.GetInputPort("mode").FixValue(self._context, Value(mode))
+
+    def _used(self, message: Message | None) -> Message:
+        """A command as it is used: no further than the sliders go, and with names that the robot knows."""
+        if message is None:
+            return self._last.model_copy(update={"twist": (0.0, 0.0, 0.0)})
+        most = np.array([axis.largest for axis in self._axes])
+        names = [posture.name for posture in self.robot.standing]
+        return message.model_copy(
+            update={
+                "twist": tuple(np.clip(message.twist, -most, most).tolist()),
+                "body": tuple(np.clip(message.body, -np.array(self._body), self._body).tolist()),
+                "posture": message.posture if message.posture in names else names[0],
+                "gait": message.gait if message.gait in GAITS else next(iter(GAITS)),
+            }
+        )
 
     def _look(self) -> str | None:
         height = float(self._eval("desired")[2])

@@ -15,7 +15,7 @@ from tornado.web import Application, RequestHandler
 from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
 from rollerbench.simulation.teleop.desk import Desk, Message
-from rollerbench.visualization.serve import listen
+from rollerbench.visualization.serve import listen, names
 
 FILES = {
     "": ("page.html", "text/html"),
@@ -26,10 +26,8 @@ FILES = {
 }
 """Files of the page by address, and their types."""
 
-LOCAL = ("localhost", "127.0.0.1", "::1")
-
-LOCAL_NAMES = r"^(localhost|127\.0\.0\.1|\[::1\])$"
-"""Names under which a server for this machine answers: a foreign page that had its own name lead here gets nothing."""
+PING_INTERVAL = 10.0
+"""Time between two looks at whether a page is still there [s]."""
 
 UNSUPPORTED = 1003
 """WebSocket's code for data that cannot be accepted."""
@@ -58,7 +56,7 @@ class Server:
         self.clients: dict[int, Channel] = {}
         self.numbers: Iterator[int] = itertools.count(1)
         self._sockets, self.url = listen(host, port)
-        self._names = LOCAL_NAMES if host in LOCAL else r".*"
+        self._names = names(host)
         self._loop = asyncio.new_event_loop()
         self._stopping = asyncio.Event()
         self._thread = threading.Thread(target=self._serve, name="teleop server", daemon=True)
@@ -95,7 +93,7 @@ class Server:
             self._loop.close()
 
     async def _main(self) -> None:
-        application = Application()
+        application = Application(websocket_ping_interval=PING_INTERVAL)
         application.add_handlers(
             self._names,
             [(r"/socket", Channel, {"server": self}), (r"/([a-z.]*)", Page)],
@@ -132,6 +130,7 @@ class Channel(WebSocketHandler):
     def initialize(self, server: Server) -> None:
         """Takes what the application passes on."""
         self._server, self._number = server, next(server.numbers)
+        self._sent: asyncio.Future[None] | None = None
 
     def open(self, *_: str, **__: str) -> None:
         """Greets the page."""
@@ -154,13 +153,15 @@ class Channel(WebSocketHandler):
         self._server.desk.leave(self._number)
 
     def send(self, text: str) -> None:
-        """Sends a text, if anybody is still there."""
+        """Sends a text, unless nobody is there any more, or the one before is still on its way."""
+        if self._sent is not None and not self._sent.done():
+            return
         try:
-            sent = asyncio.ensure_future(self.write_message(text))
+            self._sent = asyncio.ensure_future(self.write_message(text))
         except WebSocketClosedError:
             return
         # A page that goes away meanwhile is no error; looking at it keeps asyncio from reporting one.
-        sent.add_done_callback(lambda future: future.cancelled() or future.exception())
+        self._sent.add_done_callback(lambda future: future.cancelled() or future.exception())
 
     def data_received(self, chunk: bytes) -> None:
         """Tornado reads the socket by itself."""

@@ -11,7 +11,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
 
 from rollerbench.description import Robot, load_robot
-from rollerbench.errors import DescriptionError, SimulationError
+from rollerbench.errors import DescriptionError, RollerbenchError
 from rollerbench.kinematics import WheelKinematics
 from rollerbench.plant import follow_rollers
 from rollerbench.simulation.advance import configure
@@ -113,11 +113,11 @@ class Session(ABC):
         """Simulates a period of control under a command; None for none: the robot comes to rest."""
         if self.fault:
             return
-        self._command(message)
         try:
+            self._command(message)
             self._simulator.AdvanceTo((self._periods + 1) * PERIOD)
             what = self._look()
-        except SimulationError as error:
+        except RollerbenchError as error:
             what = str(error)
         except (RuntimeError, SystemExit) as error:
             what = f"Drake stopped: {error}"

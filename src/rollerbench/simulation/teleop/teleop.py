@@ -19,7 +19,6 @@ from rollerbench.simulation.teleop.session import PERIOD, Session, teleop_scenar
 from rollerbench.simulation.teleop.wheel_session import WheelSession
 from rollerbench.visualization.live_scene import LiveScene
 from rollerbench.visualization.scene import local_meshcat
-from rollerbench.visualization.serve import EVERYWHERE
 
 FRAME_TIME, STATE_TIME = 1 / 30, 1 / 15
 """Times between two pictures, and between two states that pages are told [s]."""
@@ -52,6 +51,8 @@ class Moment:
 class Teleop:
     """A robot in simulation, and a page to drive it by hand: `run` here, or a `with` block while which it runs.
 
+    The port of its scene, which is Drake's Meshcat, stays open until the process ends.
+
     Attributes:
         url: The page's address, once it runs.
         history: The last moments.
@@ -80,9 +81,10 @@ class Teleop:
         Raises:
             RollerbenchError: an argument is not valid.
         """
-        if isinstance(timeout, bool) or not (math.isfinite(timeout) and timeout > 0):
+        number = isinstance(timeout, int | float) and not isinstance(timeout, bool)
+        if not (number and math.isfinite(timeout) and timeout > 0):
             raise RollerbenchError(f"--timeout {timeout}: accepted: a positive number of seconds")
-        if not 0 <= port <= LARGEST_PORT:
+        if type(port) is not int or not 0 <= port <= LARGEST_PORT:
             raise RollerbenchError(f"--port {port}: accepted: 0 (any that is free) to {LARGEST_PORT}")
         self._scenario = teleop_scenario(robot, overrides)
         self._host, self._port, self._timeout = host, port, timeout
@@ -94,6 +96,9 @@ class Teleop:
 
     def __enter__(self) -> Self:
         """Runs in a thread until the block ends; returns once the page is served."""
+        self._stop.clear()
+        self._ready.clear()
+        self._error = None
         self._thread = threading.Thread(target=self._run_quietly, name="teleop", daemon=True)
         self._thread.start()
         self._ready.wait()
@@ -134,7 +139,7 @@ class Teleop:
         server = Server(desk, self._host, self._port)
         try:
             # Meshcat wants to be spoken to from the thread that made it.
-            meshcat = local_meshcat("*" if self._host in EVERYWHERE else self._host)
+            meshcat = local_meshcat(self._host)
             legs = bool(self._scenario.robot.legs)
             session: Session = (LegSession if legs else WheelSession)(self._scenario, meshcat)
             scene = LiveScene(meshcat, session.robot, camera="follow")
@@ -198,7 +203,8 @@ class Teleop:
             "fault": session.fault,
             "driver": order.driver,
             "late": order.late,
-            **session.state(order.message),
+            "lapses": order.lapses,
+            **session.state(None if session.fault else order.message),
         }
         server.broadcast(self._state)
 

@@ -14,6 +14,9 @@ from rollerbench.simulation.teleop.driver import Array, Told, WheelDriver, Wish
 from rollerbench.simulation.teleop.session import PERIOD, Session, plain, pose_error
 from rollerbench.simulation.watch import fault
 
+STEERING = 180.0
+"""How far steered wheels can be asked to turn from heading_deg [deg]."""
+
 
 class WheelSession(Session):
     """A simulated robot on wheels.
@@ -127,17 +130,22 @@ class WheelSession(Session):
         return fault(self._station.parts.model, self._plant_context)
 
     def _wish(self, message: Message | None) -> Wish:
+        """What a command asks for, no further than the sliders go."""
         if message is None:
             return self.driver.rest(self.told)
-        robot, told = self.robot, self.told
+        robot, told, ranges = self.robot, self.told, self.driver.ranges
         steered = zip(robot.steered_wheels, told.steering_angles, strict=True)
         angles = [
-            np.radians(message.steering[wheel.name]) if wheel.name in message.steering else angle
+            np.radians(np.clip(message.steering[wheel.name], -STEERING, STEERING))
+            if wheel.name in message.steering
+            else angle
             for wheel, angle in steered
         ]
+        most, fastest = np.array([axis.largest for axis in ranges.axes]), ranges.wheel_speeds
+        speeds = [message.wheels.get(wheel.name, 0.0) for wheel in robot.driven_wheels]
         return Wish(
             mode=message.mode,
-            v_xyw_B=np.array(message.twist),
-            wheel_speeds=np.array([message.wheels.get(wheel.name, 0.0) for wheel in robot.driven_wheels]),
+            v_xyw_B=np.clip(message.twist, -most, most),
+            wheel_speeds=np.clip(speeds, -fastest, fastest),
             steering_angles=np.array(angles, dtype=np.float64),
         )

@@ -32,6 +32,7 @@ export function listenToKeys(sideways, drive, stop) {
   };
 
   window.addEventListener("keydown", (event) => {
+    if (event.key === "Meta") release(); // While it is down, some systems tell nothing of keys that are let go.
     if (event.ctrlKey || event.metaKey || event.altKey) return;
     if (event.code === "Space" || event.code === "Escape") {
       // Space stops, wherever the focus is; Enter presses buttons.
@@ -44,13 +45,15 @@ export function listenToKeys(sideways, drive, stop) {
       // Arrow keys move a slider that has the focus.
       if (event.code.startsWith("Arrow") && event.target.type === "range") return;
       event.preventDefault();
-      if (held.has(event.code)) return;
+      // A key that was held when Stop came drives again when it is pressed anew.
+      if (event.repeat || held.has(event.code)) return;
       held.set(event.code, true);
       apply(axisOf(event.code), event.shiftKey);
     }
   });
   window.addEventListener("keyup", (event) => {
     if (event.code === "Space") event.preventDefault();
+    if (event.key === "Meta") release();
     if (event.key === "Shift") heldAxes().forEach((axis) => apply(axis, false));
     if (!held.delete(event.code)) return;
     apply(axisOf(event.code), event.shiftKey);

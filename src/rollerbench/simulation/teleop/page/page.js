@@ -22,7 +22,7 @@ const drives = () => (state && state.driver === me) || performance.now() - touch
 const values = (controls) => Object.fromEntries(Object.entries(controls).map(([name, { input }]) => [name, Number(input.value)]));
 
 function command() {
-  const message = { touch: touches, mode };
+  const message = { touch: touches, lapses: state ? state.lapses : 0, mode };
   if (mode === "twist") message.twist = panels.twist.inputs.map((input) => Number(input.value));
   if (mode === "wheels") message.wheels = values(panels.wheels.wheels);
   if (mode === "wheels") message.steering = values(panels.wheels.steering);
@@ -105,7 +105,7 @@ function show() {
   const slow = state.factor < 0.9 ? ["slower than real time: this machine cannot keep up"] : [];
   byId("notes").textContent = [...state.notes, ...slow].join(" · ");
   alertOf(state.fault ? `The simulation stopped: ${state.fault}. Reset starts again.`
-    : state.late ? `No word from the page that drives for ${hello.timeout} s: the robot stops.` : "");
+    : state.late ? `No word from the page that drives for ${hello.timeout} s: the robot stops until a control is moved anew.` : "");
 }
 
 function alertOf(text) {
@@ -136,8 +136,12 @@ function build() {
     button.addEventListener("click", () => send(button.dataset.camera));
   });
   document.addEventListener("visibilitychange", () => { if (document.hidden && drives()) stop(); });
-  // A click into the scene takes the keyboard away from this page: give it back.
-  document.querySelector(".scene").addEventListener("mouseleave", () => { byId("scene").blur(); window.focus(); });
+  // A click into the scene takes the keyboard away from this page: give it back, so that Space stops.
+  window.addEventListener("blur", () => setTimeout(() => {
+    if (document.activeElement !== byId("scene")) return;
+    byId("scene").blur();
+    window.focus();
+  }));
   setInterval(() => { if (!document.hidden) { pollGamepad(); send(); } }, SEND_TIME);
 }
 
@@ -146,13 +150,18 @@ function connect() {
   socket.onmessage = (event) => {
     const message = JSON.parse(event.data);
     if (message.kind === "hello") {
-      if (hello && (message.robot !== hello.robot || message.meshcat_port !== hello.meshcat_port)) location.reload();
+      if (hello && JSON.stringify({ ...message, you: hello.you }) !== JSON.stringify(hello)) location.reload();
       hello = message;
       me = message.you;
       if (!panels) build();
       touches = 0;
       touched = -Infinity;
     } else {
+      if (state && state.driver === me && message.driver !== me) {
+        // Another page took over, or the robot was stopped: what was asked for here no longer counts.
+        zero();
+        touched = -Infinity;
+      }
       state = message;
       follow();
       show();
