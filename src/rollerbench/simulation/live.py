@@ -18,6 +18,7 @@ from rollerbench.simulation.leg_station import LegStation
 from rollerbench.simulation.scenario import Scenario
 from rollerbench.simulation.station import Station
 from rollerbench.simulation.watch import CHUNK
+from rollerbench.visualization import marks
 from rollerbench.visualization.live_marks import ForceArrows, SupportPolygon
 from rollerbench.visualization.live_scene import LiveScene
 from rollerbench.visualization.scenes import View
@@ -238,7 +239,7 @@ class LiveShow:
             places, forces, slips = map(self._output, ("contact_points", "contact_forces", "slip"))
             self._arrows.show(places.reshape(-1, 3), forces.reshape(-1, 3), slips)
         if self._support is not None:
-            stands = self._output("stance") > 0.5
+            stands = self._output("normal_forces") > marks.BEARS * model.robot.mass * GRAVITY
             self._support.show(_soles(self._station, self._context)[stands])
 
     def _output(self, name: str) -> Array:

@@ -25,8 +25,9 @@ class ForceArrows:
         """Makes an arrow of each colour for each wheel or foot; all wait out of sight."""
         self._meshcat = meshcat
         parts, size = robot.wheels or robot.legs, marks.size_of(robot)
-        self._scale = palette.FORCE_LENGTH * size * len(parts) / (robot.mass * GRAVITY)
-        self._longest, self._least = palette.FORCE_LENGTH * size * len(parts), 0.02 * palette.FORCE_LENGTH * size
+        length = marks.force_length(robot)
+        self._scale = length * len(parts) / (robot.mass * GRAVITY)
+        self._longest, self._least = length * len(parts), 0.02 * length
         self._buried = transform(np.eye(3), np.array([0.0, 0.0, marks.BURIED * size]))
         self._shown = [0] * len(parts)
         shape = marks.arrow(self._longest, palette.FORCE_WIDTH * size)
