@@ -229,6 +229,7 @@ def test_the_page_pauses_the_run_and_shows_the_ghost_apart_from_the_robot() -> N
     scenario = rb.load_scenario(
         "cart_straight",
         overrides={
+            "duration": 7.0,
             "errors.gear_error": {"left": {"constant": -0.3}},
             "recording.html": False,
             "recording.camera": "follow",
@@ -250,7 +251,7 @@ def test_the_page_pauses_the_run_and_shows_the_ghost_apart_from_the_robot() -> N
         with opened(address[0]) as watched:
             page = watched.page
             page.get_by_text("Open Controls").click()
-            while times[-1] < 0.6 * scenario.duration and worker.is_alive():
+            while times[-1] < 0.3 * scenario.duration and worker.is_alive():
                 page.wait_for_timeout(50)
             page.get_by_text("Pause / Resume", exact=True).click()
             page.wait_for_timeout(300)

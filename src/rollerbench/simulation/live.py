@@ -13,6 +13,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
 
+from rollerbench.description.inertia import GRAVITY
 from rollerbench.kinematics.profile import reference_poses
 from rollerbench.simulation.leg_station import LegStation
 from rollerbench.simulation.scenario import Scenario

@@ -51,8 +51,8 @@ class LiveScene:
             reference_q_xyt: Path (n, 3) that it will be asked to drive, if known; the ground reaches beyond it.
         """
         self._meshcat, self._robot, self._size = meshcat, robot, marks.size_of(robot)
-        for path in LEFTOVERS:
-            meshcat.Delete(path)
+        for leftover in LEFTOVERS:
+            meshcat.Delete(leftover)
         path = np.zeros((1, 3)) if reference_q_xyt is None else reference_q_xyt
         self._low, self._high = path[:, :2].min(axis=0), path[:, :2].max(axis=0)
         if reference_q_xyt is None:
