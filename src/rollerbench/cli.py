@@ -379,7 +379,7 @@ def _view(camera: str) -> "View":
 def _live_page(host: str, port: int | None) -> dict[str, Any]:
     """What shows a run live: arguments of `run`. At a terminal a browser opens, and the page stays until Enter."""
     from rollerbench.simulation import Live
-    from rollerbench.visualization.scene import local_meshcat
+    from rollerbench.visualization.surroundings import local_meshcat
 
     meshcat = local_meshcat(host, port)
     print(f"Live at {meshcat.web_url()}", file=sys.stderr)

@@ -18,7 +18,7 @@ from rollerbench.recording import Recording
 from rollerbench.simulation.live import FRAME, LATEST, Pace
 from rollerbench.simulation.watch import CHUNK
 from rollerbench.visualization.live_scene import LiveScene
-from rollerbench.visualization.scene import local_meshcat
+from rollerbench.visualization.surroundings import local_meshcat
 
 QUICK = {"duration": 0.4, "command.ramp": 0.1, "recording.html": False}
 

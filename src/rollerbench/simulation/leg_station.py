@@ -18,7 +18,7 @@ from rollerbench.systems import PlanarState, SlipMonitor
 from rollerbench.systems.leg_servo import LegServo, damp_joints, unlimited
 from rollerbench.systems.legs import GaitPlanner, LegTracker
 from rollerbench.systems.stance import BodyPoseController, LegWatch, StanceOdometry
-from rollerbench.visualization.scene import add_ground_visual, add_meshcat
+from rollerbench.visualization.surroundings import add_ground_visual, add_meshcat
 
 
 @dataclass(frozen=True, kw_only=True)

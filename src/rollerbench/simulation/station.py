@@ -18,7 +18,7 @@ from rollerbench.simulation.motors import Motors, add_motors, add_roll_resistanc
 from rollerbench.simulation.scenario import Scenario, load_scenario
 from rollerbench.simulation.wheel_command import FOR_LEGS, CommandFrom, add_command, drive_of, steers
 from rollerbench.systems import Odometry, PlanarState, SlipMonitor, SteeredOdometry
-from rollerbench.visualization.scene import add_bump_visuals, add_ground_visual, add_meshcat
+from rollerbench.visualization.surroundings import add_bump_visuals, add_ground_visual, add_meshcat
 
 LOGGED = ("state", "wheel_speed_command", "wheel_speeds", "net_actuation", "odometry", "rollers", "contact_forces")
 """Outputs that a run records."""

@@ -18,7 +18,7 @@ from rollerbench.simulation.teleop.server import Server
 from rollerbench.simulation.teleop.session import PERIOD, Session, teleop_scenario
 from rollerbench.simulation.teleop.wheel_session import WheelSession
 from rollerbench.visualization.live_scene import LiveScene
-from rollerbench.visualization.scene import local_meshcat
+from rollerbench.visualization.surroundings import local_meshcat
 
 FRAME_TIME, STATE_TIME = 1 / 30, 1 / 15
 """Times between two pictures, and between two states that pages are told [s]."""

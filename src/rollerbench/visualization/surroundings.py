@@ -17,6 +17,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import RigidBody
 from pydrake.systems.framework import DiagramBuilder
 
+from rollerbench import palette
 from rollerbench.description import Robot
 from rollerbench.errors import ResourceError
 from rollerbench.kinematics.bumps import Bumps
@@ -24,9 +25,6 @@ from rollerbench.visualization.serve import EVERYWHERE
 
 GROUND_SIZE = 40
 """Side of the ground that is shown, over the size of the robot [-]."""
-
-GROUND_COLOR = np.array([0.88, 0.89, 0.90, 1.0])
-BUMP_COLOR = np.array([0.72, 0.66, 0.58, 1.0])
 
 
 def local_meshcat(host: str = "localhost", port: int | None = None) -> Meshcat:
@@ -64,7 +62,7 @@ def add_ground_visual(plant: MultibodyPlant, robot: Robot) -> None:
     side, thickness = GROUND_SIZE * size, 0.05 * size
     slab = Box(side, side, thickness)
     pose = RigidTransform([0.0, 0.0, -0.5 * thickness - 0.001 * size])
-    plant.RegisterVisualGeometry(plant.world_body(), pose, slab, "ground", GROUND_COLOR)
+    plant.RegisterVisualGeometry(plant.world_body(), pose, slab, "ground", np.array([*palette.GROUND, 1.0]))
 
 
 def add_bump_visuals(plant: MultibodyPlant, body: RigidBody, bumps: Bumps) -> None:
@@ -75,7 +73,9 @@ def add_bump_visuals(plant: MultibodyPlant, body: RigidBody, bumps: Bumps) -> No
     places = zip(bumps.centers_W, bumps.half_widths, bumps.heights, strict=True)
     for index, ((x, y, _), half_width, height) in enumerate(places):
         shape = Ellipsoid(half_width, half_width, height)
-        plant.RegisterVisualGeometry(body, RigidTransform([x, y, 0.0]), shape, f"bump_{index}", BUMP_COLOR)
+        plant.RegisterVisualGeometry(
+            body, RigidTransform([x, y, 0.0]), shape, f"bump_{index}", np.array([*palette.BUMP, 1.0])
+        )
 
 
 def add_meshcat(
