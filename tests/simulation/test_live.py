@@ -15,7 +15,8 @@ import rollerbench as rb
 from browser import opened
 from rollerbench.errors import ResourceError, SimulationError
 from rollerbench.recording import Recording
-from rollerbench.simulation.live import FRAME, LATEST, Pace
+from rollerbench.simulation.live import FRAME
+from rollerbench.simulation.pace import LATEST, Pace
 from rollerbench.simulation.watch import CHUNK
 from rollerbench.visualization.live_scene import LiveScene
 from rollerbench.visualization.surroundings import local_meshcat

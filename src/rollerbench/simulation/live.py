@@ -16,6 +16,7 @@ from pydrake.systems.framework import Context
 from rollerbench.description.inertia import GRAVITY
 from rollerbench.kinematics.profile import reference_poses
 from rollerbench.simulation.leg_station import LegStation
+from rollerbench.simulation.pace import Pace
 from rollerbench.simulation.scenario import Scenario
 from rollerbench.simulation.station import Station
 from rollerbench.simulation.watch import CHUNK
@@ -28,9 +29,6 @@ Array = NDArray[np.float64]
 
 FRAME = 1 / 30
 """Time between two pictures, and what the button Step simulates [s]."""
-
-LATEST = 0.1
-"""A simulation that is slower than the clock does not make up for more than this [s]."""
 
 POLL = 0.02
 """Time between two looks at the buttons of a simulation that waits [s]."""
@@ -61,26 +59,6 @@ class Live:
     stay: Callable[[], bool] = lambda: False
     clock: Callable[[], float] = time.monotonic
     sleep: Callable[[float], None] = time.sleep
-
-
-class Pace:
-    """Keeps simulated time to a clock, without running after it for long."""
-
-    def __init__(self, clock: Callable[[], float]) -> None:
-        """Starts at the clock's present time [s]."""
-        self._clock, self._due = clock, clock()
-
-    def add(self, simulated: float, speed: float) -> None:
-        """Counts simulated time [s] that shall take 1 / speed times as long."""
-        self._due = max(self._due + simulated / speed, self._clock() - LATEST)
-
-    def ahead(self) -> float:
-        """How long to wait [s]."""
-        return self._due - self._clock()
-
-    def restart(self) -> None:
-        """Forgets what is due."""
-        self._due = self._clock()
 
 
 class Controls:

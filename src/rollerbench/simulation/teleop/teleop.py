@@ -12,6 +12,7 @@ from typing import Any, Self
 
 from rollerbench.description import Robot
 from rollerbench.errors import RollerbenchError
+from rollerbench.simulation.pace import Pace
 from rollerbench.simulation.teleop.desk import Desk, Order
 from rollerbench.simulation.teleop.leg_session import LegSession
 from rollerbench.simulation.teleop.server import Server
@@ -24,9 +25,6 @@ FRAME_TIME, STATE_TIME = 1 / 30, 1 / 15
 """Times between two pictures, and between two states that pages are told [s]."""
 
 LARGEST_PORT = 65535
-
-LARGEST_LAG = 0.1
-"""How much of the time that it lost the simulation makes up for [s]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -218,16 +216,15 @@ class _Pace:
 
     def __init__(self) -> None:
         self.factor = 1.0
-        self._due = self._since = time.monotonic()
-        self._periods = 0
+        self._pace, self._since, self._periods = Pace(time.monotonic), time.monotonic(), 0
 
     def wait(self, stop: threading.Event) -> None:
         """Waits until the next period is due; time that was lost is made up for only in part."""
-        now = time.monotonic()
-        self._due = max(self._due + PERIOD, now - LARGEST_LAG)
+        self._pace.add(PERIOD, 1.0)
         self._periods += 1
-        if now - self._since >= 1.0:
-            self.factor = self._periods * PERIOD / (now - self._since)
-            self._since, self._periods = now, 0
-        if self._due > now:
-            stop.wait(self._due - now)
+        passed = time.monotonic() - self._since
+        if passed >= 1.0:
+            self.factor = self._periods * PERIOD / passed
+            self._since, self._periods = time.monotonic(), 0
+        if self._pace.ahead() > 0:
+            stop.wait(self._pace.ahead())
