@@ -12,7 +12,7 @@ from pydrake.multibody.plant import MultibodyPlant
 import rollerbench as rb
 from rollerbench import palette
 from rollerbench.resources import robot_names
-from rollerbench.visualization import marks
+from rollerbench.visualization import floor, marks
 from rollerbench.visualization.model import read_model
 from rollerbench.visualization.motion import motion_of
 from rollerbench.visualization.scenes import Scene, SeenRun, robot_of, scene_of
@@ -132,7 +132,7 @@ def test_wheels_faster_than_frames_are_seen_turning_the_right_way(sliding: SeenR
 )
 def test_the_grid_suits_robot_and_path(size: float, extent: float, expected: list[float]) -> None:
     """Neither finer than a tenth of the robot nor more lines than one can see."""
-    assert marks.grid_pitches(np.zeros(2), np.array([extent, 1.0]), size) == pytest.approx(expected)
+    assert floor.grid_pitches(np.zeros(2), np.array([extent, 1.0]), size) == pytest.approx(expected)
 
 
 def test_forces_bear_the_weight_and_stand_where_wheels_touch(sliding: SeenRun) -> None:

@@ -9,7 +9,7 @@ from pydrake.geometry import Meshcat, Rgba
 from rollerbench import palette
 from rollerbench.description import Robot
 from rollerbench.palette import Color
-from rollerbench.visualization import marks
+from rollerbench.visualization import floor, marks
 from rollerbench.visualization.drake_shapes import drake_shape
 from rollerbench.visualization.scenes import FIELD_OF_VIEW, Camera, View, cameras
 from rollerbench.visualization.shapes import Item, Mesh, ribbon
@@ -109,7 +109,7 @@ class LiveScene:
 
     def _draw_ground(self) -> None:
         self._meshcat.Delete(STATION_GROUND)
-        for item in marks.ground(self._low, self._high, self._size):
+        for item in floor.ground(self._low, self._high, self._size):
             draw(self._meshcat, item)
 
 

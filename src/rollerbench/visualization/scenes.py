@@ -13,7 +13,7 @@ from rollerbench.description import Robot
 from rollerbench.kinematics.bumps import STEP_WIDTH
 from rollerbench.palette import Color
 from rollerbench.recording import Recording
-from rollerbench.visualization import marks
+from rollerbench.visualization import floor, marks
 from rollerbench.visualization.model import read_model
 from rollerbench.visualization.motion import Motion, motion_of
 from rollerbench.visualization.shapes import Box, Item
@@ -174,16 +174,16 @@ def scene_of(
         np.min([path.min(axis=0) for path in paths], axis=0),
         np.max([path.max(axis=0) for path in paths], axis=0),
     )
-    floor = marks.ground(low, high, size)
+    ground = floor.ground(low, high, size)
     return Scene(
         runs=tuple(seen),
-        items=(*floor, *_surroundings(runs), *items),
+        items=(*ground, *_surroundings(runs), *items),
         times=times,
         tracks=tracks,
         cameras=cameras(low, high, size, robots[0]),
         view=view,
         shown=frozenset(name for name, on in (("forces", forces), ("slip", slip)) if on),
-        pitches=tuple(marks.grid_pitches(*_reach(floor), size)),
+        pitches=tuple(floor.grid_pitches(*_reach(ground), size)),
         slope_deg=runs[0].recording.metadata.get("ground", {}).get("slope_deg", 0.0),
     )
 
@@ -249,9 +249,9 @@ def _trail(run: SeenRun, q_xyt: Array, layer: str, color: Color, robot: Robot, p
     )
 
 
-def _reach(floor: Sequence[Item]) -> tuple[Array, Array]:
+def _reach(ground: Sequence[Item]) -> tuple[Array, Array]:
     """Where the ground begins and ends (2,)."""
-    slab = floor[0]
+    slab = ground[0]
     assert isinstance(slab.shape, Box)
     half = 0.5 * np.array(slab.shape.size[:2])
     return slab.X_FG[:2, 3] - half, slab.X_FG[:2, 3] + half
@@ -275,8 +275,8 @@ def _surroundings(runs: Sequence[SeenRun]) -> list[Item]:
         if ground in grounds[:index]:
             continue
         if ground.get("bumps"):
-            items += marks.bumps(*(np.array(ground["bumps"][key]) for key in ("centers", "half_widths", "heights")))
-        items += marks.steps(ground.get("steps", ()), STEP_WIDTH)
+            items += floor.bumps(*(np.array(ground["bumps"][key]) for key in ("centers", "half_widths", "heights")))
+        items += floor.steps(ground.get("steps", ()), STEP_WIDTH)
     return items
 
 
