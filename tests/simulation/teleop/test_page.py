@@ -15,7 +15,7 @@ from rollerbench.simulation.teleop import Teleop
 PATIENCE = 60.0
 """Machines may be slow: nothing here is waited for without an end [s]."""
 
-TIMEOUT = 0.5
+TIMEOUT = 5.0
 
 
 def until(met: Callable[[], Any]) -> None:
@@ -68,6 +68,8 @@ def test_a_page_drives_the_robot_and_the_robot_stops_when_it_goes() -> None:
         page.keyboard.press("ArrowRight")
         until(lambda: state()["twist"][0] > 0)
         page.locator("#scene").click()
+        page.wait_for_timeout(200)
+        page.wait_for_function("document.activeElement.id !== 'scene'")
         page.keyboard.press("Space")
         until(lambda: not any(state()["twist"]))
         page.keyboard.down("w")

@@ -226,7 +226,9 @@ def test_a_port_in_use_is_refused() -> None:
 
 
 def test_the_command_serves_until_it_is_interrupted() -> None:
-    code = "from rollerbench.cli import main; main()"
+    # Where tests run in the background, interrupts are ignored, and so would they be here.
+    code = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
+    code += "from rollerbench.cli import main; main()"
     arguments = [sys.executable, "-c", code, "teleop", "kiwi", "--no-open"]
     with subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stderr is not None
@@ -235,5 +237,8 @@ def test_the_command_serves_until_it_is_interrupted() -> None:
         with urllib.request.urlopen(url) as answer:
             assert b"rollerbench teleop" in answer.read()
         process.send_signal(signal.SIGINT)
-        assert process.wait(PATIENCE) == 0
+        try:
+            assert process.wait(PATIENCE) == 0
+        finally:
+            process.kill()
         assert process.stderr.read() == ""
