@@ -139,7 +139,7 @@ def teleop(
     robot: Annotated[str, typer.Argument(help="Name of a shipped robot, or path to a robot.yaml.")],
     host: Annotated[
         str, typer.Option(help="Where to serve the page; 0.0.0.0 lets other machines see it, and drive.")
-    ] = "localhost",
+    ] = LOCAL,
     port: Annotated[int, typer.Option(help="The page's port.", show_default="any that is free")] = 0,
     timeout: Annotated[float, typer.Option(help="Seconds without a word from the page until the robot stops.")] = 0.5,
     set_: Annotated[
@@ -151,14 +151,11 @@ def teleop(
     ] = None,
 ) -> None:
     """Drive a simulated robot by hand, from a page with sliders, keyboard and gamepad, beside its ghost."""
-    import webbrowser
-
     from rollerbench.simulation.teleop import Teleop
 
     def ready(url: str) -> None:
         print(f"Drive at {url} (Ctrl-C ends)", file=sys.stderr)
-        if sys.stdout.isatty() if open_ is None else open_:
-            webbrowser.open(url)
+        _browse(url, wanted=open_)
 
     driven = Teleop(robot, overrides=set_ or [], host=host, port=port, timeout=timeout)
     with suppress(KeyboardInterrupt):
@@ -237,9 +234,11 @@ def replay(
     camera: Annotated[str, typer.Option(help="iso, top, or follow: with the first robot.")] = "iso",
     forces: Annotated[bool, typer.Option("--forces", help="Show forces of the ground, if recorded.")] = False,
     slip: Annotated[bool, typer.Option("--slip", help="Show where wheels slid.")] = False,
-    host: Annotated[str, typer.Option(help="Address to listen at; 0.0.0.0 lets other machines look.")] = "localhost",
+    host: Annotated[str, typer.Option(help="Address to listen at; 0.0.0.0 lets other machines look.")] = LOCAL,
     port: Annotated[int, typer.Option(help="Port to listen at.", show_default="any free one", min=0, max=65535)] = 0,
-    open_: Annotated[bool, typer.Option("--open/--no-open", help="Open a browser.")] = True,
+    open_: Annotated[
+        bool | None, typer.Option("--open/--no-open", help="Open a browser.", show_default="on a terminal")
+    ] = None,
 ) -> None:
     """Show stored runs without simulating them again; needs no Drake."""
     from rollerbench.visualization.replay import replay as replay_runs
@@ -401,15 +400,15 @@ def _live_page(host: str, port: int | None) -> dict[str, Any]:
     import select
     import termios
 
-    _browse(meshcat.web_url(), wanted=True)
+    _browse(meshcat.web_url())
     return {"meshcat": meshcat, "live": Live(patience=5.0, stay=stay)}
 
 
-def _browse(address: str, *, wanted: bool) -> None:
-    """Opens a browser, if somebody sits at the terminal."""
+def _browse(address: str, *, wanted: bool | None = None) -> None:
+    """Opens a browser if that is wanted, or, where nothing is said, if somebody sits at the terminal."""
     import webbrowser
 
-    if wanted and sys.stdout.isatty():
+    if sys.stdout.isatty() if wanted is None else wanted:
         webbrowser.open(address)
 
 

@@ -21,6 +21,7 @@ from rollerbench import palette
 from rollerbench.description import Robot
 from rollerbench.errors import ResourceError
 from rollerbench.kinematics.bumps import Bumps
+from rollerbench.visualization.marks import size_of
 from rollerbench.visualization.serve import EVERYWHERE
 
 GROUND_SIZE = 40
@@ -58,8 +59,8 @@ def add_ground_visual(plant: MultibodyPlant, robot: Robot) -> None:
 
     Its top is a thousandth of the robot's size below z = 0, so that lines on the ground show.
     """
-    size = _size(robot)
-    side, thickness = GROUND_SIZE * size, 0.05 * size
+    size = size_of(robot)
+    side, thickness = GROUND_SIZE * size, palette.GROUND_THICKNESS * size
     slab = Box(side, side, thickness)
     pose = RigidTransform([0.0, 0.0, -0.5 * thickness - 0.001 * size])
     plant.RegisterVisualGeometry(plant.world_body(), pose, slab, "ground", np.array([*palette.GROUND, 1.0]))
@@ -84,8 +85,3 @@ def add_meshcat(
     """Shows a scene graph's illustration geometry in Meshcat."""
     parameters = MeshcatVisualizerParams(publish_period=1 / frames_per_second)
     return MeshcatVisualizer.AddToBuilder(builder, scene_graph, meshcat, parameters)
-
-
-def _size(robot: Robot) -> float:
-    """Largest horizontal extent of the robot [m]."""
-    return max(2 * robot.reach, *robot.body.size[:2])
